@@ -1,0 +1,88 @@
+//! What can go wrong, in the words the artist reads.
+
+/// The result of every fallible operation of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Every failure a caller can act on. The `what` fields name an input: "source", "target", ...
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A mesh without a single triangle.
+    #[error("the {what} mesh has no triangles")]
+    NoTriangles {
+        /// Which mesh.
+        what: &'static str,
+    },
+    /// A NaN or infinite coordinate.
+    #[error("the {what} mesh has a position that is not finite at vertex {vertex}")]
+    PositionNotFinite {
+        /// Which mesh.
+        what: &'static str,
+        /// First offending vertex.
+        vertex: usize,
+    },
+    /// A triangle that names a vertex which is not there.
+    #[error("triangle {triangle} of the {what} mesh names vertex {vertex}, but there are only {count}")]
+    VertexOutOfRange {
+        /// Which mesh.
+        what: &'static str,
+        /// First offending triangle.
+        triangle: usize,
+        /// The index it names.
+        vertex: u32,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A weight that is NaN or infinite.
+    #[error("vertex {vertex} has a weight that is not finite (bone {bone})")]
+    WeightNotFinite {
+        /// First offending vertex.
+        vertex: usize,
+        /// Bone of the offending entry.
+        bone: u32,
+    },
+    /// CSR arrays that do not describe a matrix.
+    #[error("the weight arrays do not fit together: {reason}")]
+    InvalidWeights {
+        /// What does not fit.
+        reason: String,
+    },
+    /// Two inputs whose lengths must agree do not.
+    #[error("{what} has {found} entries where {expected} are needed")]
+    LengthMismatch {
+        /// The input's name.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it must have.
+        expected: usize,
+    },
+    /// A parameter outside of its range.
+    #[error("{name} is {value}, but {must}")]
+    InvalidParameter {
+        /// The parameter's name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        must: &'static str,
+    },
+    /// No target vertex lies close enough to the source.
+    #[error("nothing matched: no vertex lies within the distance now in force, {max_distance:.6}; {advice}")]
+    NothingMatched {
+        /// The distance in force, in world units.
+        max_distance: f64,
+        /// Smallest distance that would match something, if any would.
+        needed: Option<f64>,
+        /// What to do about it.
+        advice: String,
+    },
+    /// A block of the system is not positive definite.
+    #[error("the inpainting system of the island around vertex {vertex} cannot be solved (pivot not positive)")]
+    NotPositiveDefinite {
+        /// A vertex of the offending block.
+        vertex: usize,
+    },
+    /// The caller asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}

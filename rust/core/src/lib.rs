@@ -1,0 +1,21 @@
+//! The numerics of Skinwright: skin-weight transfer, desparsification and sculpt-to-weights.
+//!
+//! Parts (mesh, surface, linear solver, ...) know nothing of the operations built on them, and
+//! operations know nothing of each other. Geometry is `f32` in world space, solves are `f64`,
+//! angles are radians, weights are CSR.
+#![forbid(unsafe_code)]
+
+pub mod adjacency;
+pub mod error;
+pub mod laplacian;
+pub mod linear_solve;
+pub mod mesh;
+pub mod progress;
+pub mod surface;
+pub mod transfer;
+pub mod weights;
+
+pub use error::{Error, Result};
+pub use mesh::TriMesh;
+pub use progress::Progress;
+pub use weights::Weights;

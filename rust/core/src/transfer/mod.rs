@@ -1,0 +1,1 @@
+//! Skin-weight transfer by weight inpainting.
