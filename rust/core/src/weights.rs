@@ -28,7 +28,11 @@ impl Weights {
         }
         let nnz = indptr[indptr.len() - 1] as usize;
         if bones.len() != nnz || values.len() != nnz {
-            return invalid(format!("indptr ends at {nnz}, but there are {} bones and {} values", bones.len(), values.len()));
+            return invalid(format!(
+                "indptr ends at {nnz}, but there are {} bones and {} values",
+                bones.len(),
+                values.len()
+            ));
         }
         if let Some(&bone) = bones.iter().find(|&&j| j >= n_bones) {
             return invalid(format!("bone {bone} is out of range, there are {n_bones}"));
