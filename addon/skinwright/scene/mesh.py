@@ -66,7 +66,8 @@ def read(obj: bpy.types.Object, *, evaluated: bool = False) -> Geometry:
     triangles = _triangles(obj)
     if determinant < 0:
         triangles = triangles[:, ::-1]
-    positions = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
+        positions = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
     _check_finite(obj, positions)
     return Geometry(positions, np.ascontiguousarray(triangles))
 
