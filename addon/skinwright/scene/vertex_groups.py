@@ -25,7 +25,7 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     Raises SceneError for a weight that is not a number.
     """
     counts, groups, values = _memberships(obj.data.vertices)
-    column = _lookup([obj.vertex_groups.find(name) for name in names], groups)
+    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], groups)
     keep = column >= 0
     vertex = np.repeat(np.arange(len(counts)), counts)[keep]
     column, values = column[keep], values[keep]
@@ -61,10 +61,15 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
 
 def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.VertexGroup]:
     """The groups of these names, created where missing. Raises SceneError where a cut name meets another."""
-    stored = [name.encode()[:_NAME_BYTES].decode(errors="ignore") for name in names]
+    stored = [_stored(name) for name in names]
     if len(set(stored)) != len(stored):
         raise SceneError(f"{obj.name} would get two groups of one name: shorten the names beyond {_NAME_BYTES} bytes")
     return [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+
+
+def _stored(name: str) -> str:
+    """The name as Blender stores it."""
+    return name.encode()[:_NAME_BYTES].decode(errors="ignore")
 
 
 def _memberships(vertices) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.float32]]:
