@@ -23,6 +23,7 @@ import demo_picture  # noqa: E402
 import demo_scene  # noqa: E402
 import makehuman  # noqa: E402
 import numpy as np  # noqa: E402
+import skinwright  # noqa: E402
 from skinwright.transfer import TransferParams, transfer_weights  # noqa: E402
 
 PARAMS = TransferParams(smoothness_length=0.1)  # metres; everything else as the add-on comes
@@ -34,6 +35,7 @@ def main() -> None:
     arguments = parse_arguments()
     started = time.perf_counter()
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    skinwright.register()
     base = makehuman.load(arguments.body)
     before, after = (demo_scene.build_character(base, label) for label in PLACES)
     for garment in before.garments.values():
