@@ -141,7 +141,7 @@ def _relax(field: Field, positions: np.ndarray, triangles: np.ndarray) -> np.nda
     """Even out the triangles along the surface; open boundaries stay where they are."""
     neighbours = igl.adjacency_matrix(triangles).astype(float)
     degree = np.asarray(neighbours.sum(axis=1))
-    boundary = np.unique(np.concatenate([np.ravel(loop) for loop in igl.boundary_loop_all(triangles)] or [[]])).astype(int)
+    boundary = np.unique(igl.boundary_facets(triangles)[0])
     for _ in range(10):
         mean = neighbours @ positions / degree
         mean[boundary] = positions[boundary]

