@@ -7,7 +7,8 @@ The garment stands off the body more and more towards the hem: about 40 % of it 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import igl
@@ -47,11 +48,11 @@ Field = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Mesh:
-    """Positions (V, 3) f32 and triangles (T, 3) u32; `weights` (V, 60) f32 where the mesh is skinned."""
+    """Positions (V, 3) f32 and triangles (T, 3) u32; `weights` (V, 60) f32, of a garment (0, 60)."""
 
     positions: np.ndarray
     triangles: np.ndarray
-    weights: np.ndarray | None = None
+    weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 60), np.float32))
 
 
 def load(name: str) -> Mesh:
@@ -59,7 +60,7 @@ def load(name: str) -> Mesh:
     path = CACHE / f"{name}.npz"
     if not path.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
-        np.savez(path, **{key: value for key, value in vars(_make(name)).items() if value is not None})
+        np.savez(path, **vars(_make(name)))
     with np.load(path) as arrays:
         return Mesh(**arrays)
 
@@ -67,8 +68,8 @@ def load(name: str) -> Mesh:
 def _make(name: str) -> Mesh:
     positions, triangles = _body() if name == "source" else _garment(*SIZES[name])
     positions = positions.astype(np.float32)
-    weights = _bone_weights(positions) if name == "source" else None
-    return Mesh(positions, triangles.astype(np.uint32), weights)
+    mesh = Mesh(positions, triangles.astype(np.uint32))
+    return replace(mesh, weights=_bone_weights(positions)) if name == "source" else mesh
 
 
 def _body() -> tuple[np.ndarray, np.ndarray]:
@@ -173,4 +174,4 @@ def _bone_weights(positions: np.ndarray, max_influences: int = 4) -> np.ndarray:
 
 def _bones(limb: Limb) -> list[Limb]:
     joints = np.linspace(limb.start, limb.end, limb.bones + 1).tolist()
-    return [Limb(tuple(a), tuple(b), 0, 0, 1) for a, b in zip(joints, joints[1:], strict=False)]
+    return [Limb(tuple(a), tuple(b), 0, 0, 1) for a, b in pairwise(joints)]

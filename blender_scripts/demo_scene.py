@@ -1,4 +1,4 @@
-"""Builds a MakeHuman character in Blender: armature, skinned body, garments that carry no weights yet, and a hard pose."""
+"""Builds a MakeHuman character in Blender: armature, skinned body, garments without weights, and a hard pose."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from mathutils import Matrix, Vector
 
 GARMENTS = {"Skirt": "helper-skirt", "Tights": "helper-tights"}
 
-# A knee lifted high to the side and a raised arm: where each joint looks, seen in Blender's world (the character faces -Y, its left is +X).
+# A knee lifted high to the side and a raised arm: where each bone points in the armature's space, in which the
+# character faces -Y and its left is +X.
 HARD_POSE = {
     "thigh_l": (0.90, -0.45, 0.0),
     "calf_l": (0.45, -0.20, -1.0),

@@ -1,8 +1,8 @@
 """Packs the add-on and its native module into the zip that Blender installs: dist/skinwright-VERSION.zip.
 
-Runs in the venv of the Makefile. The wheel is linked against glibc 2.28 through zig where the `ziglang` package is there,
-so that it loads on any Linux that Blender itself supports; without it the zip works only on systems as new as this one.
-Blender's own extension tool, which lies inside the bpy wheel, validates and builds: no Blender executable is needed.
+Runs in the venv of the Makefile. The wheel is linked against glibc 2.28 through zig where the `ziglang` package is
+there, so that it loads on any Linux that Blender itself supports; without it the zip works only on systems as new as
+this one. Blender's own extension tool, which lies inside the bpy wheel, validates and builds: no executable is needed.
 """
 
 from __future__ import annotations
