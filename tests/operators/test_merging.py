@@ -72,9 +72,7 @@ def merged_one_vertex(new, old, locked, factor, limit):
 def test_merge_against_brute_force(merging, csr, new, old, locks, factor, limit):
     locked = np.array(locks)
     old[:, locked] /= np.maximum(old[:, locked].sum(1, keepdims=True), 1) * 1.01
-    rows = merging.merge(
-        rows_of(csr, new), rows_of(csr, old), locked=locked, factor=factor, max_influences=limit
-    )
+    rows = merging.merge(rows_of(csr, new), rows_of(csr, old), locked=locked, factor=factor, max_influences=limit)
     expected = [merged_one_vertex(*pair, locked, factor, limit) for pair in zip(new, old, strict=True)]
     assert dense_of(csr, rows) == pytest.approx(np.array(expected), abs=2e-6)
 

@@ -102,7 +102,8 @@ def _set_weights(
     values[held] = rows.values[order[position[held]]]
     ends = np.cumsum(counts)
     touched = np.flatnonzero(np.bincount(row[held], minlength=len(counts)))
-    for index, start, end in zip(indices[touched].tolist(), (ends - counts)[touched].tolist(), ends[touched].tolist()):
+    spans = np.stack([indices[touched], (ends - counts)[touched], ends[touched]], axis=1)
+    for index, start, end in spans.tolist():
         vertices[index].groups.foreach_set("weight", values[start:end])
     stale = (column >= 0) & ~held
     return indices[row[stale]], group[stale]
