@@ -1,13 +1,10 @@
 """The benchmark's meshes are what it says they are, and its peers solve the same problem as we do."""
 
-import numpy as np
-import pytest
-
-igl = pytest.importorskip("igl", reason="needs libigl")
-pytest.importorskip("scipy", reason="needs SciPy")
-
+import igl
 import meshes
+import numpy as np
 import peers
+import pytest
 
 
 @pytest.fixture(scope="module")
