@@ -16,7 +16,7 @@ COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass
 class SkinnedMesh:
-    """Positions (V, 3) float32, triangles (T, 3), weights (V, bones) sparse or None; vertices of equal position merged."""
+    """Positions (V, 3) float32, triangles (T, 3), weights (V, bones) sparse or None; equal positions are merged."""
 
     name: str
     positions: np.ndarray
@@ -92,4 +92,6 @@ def _merge_equal_positions(name, positions, triangles, weights) -> SkinnedMesh:
     new = np.searchsorted(kept, first)[inverse.ravel()]
     triangles = new[triangles]
     distinct = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return SkinnedMesh(name, positions[kept].astype(np.float32), triangles[distinct], None if weights is None else weights[kept])
+    return SkinnedMesh(
+        name, positions[kept].astype(np.float32), triangles[distinct], None if weights is None else weights[kept]
+    )

@@ -64,7 +64,8 @@ def match(source: tuple, target: tuple) -> Matching:
 
 def tied_rows(source: tuple, point: np.ndarray) -> np.ndarray:
     """The row of every source triangle that is as near to `point` as the nearest one, within 1e-12 of the squared
-    diagonal (spec-transfer, section 1: a tie may take any of them)."""
+    diagonal (spec-transfer, section 1: a tie may take any of them).
+    """
     positions, triangles, weights = source
     tolerance = 1e-12 * (np.ptp(positions, axis=0) ** 2).sum()
     rows, nearest, left = [], np.inf, triangles

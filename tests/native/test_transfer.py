@@ -21,7 +21,9 @@ def grid(n: int, height=lambda x, y: 0 * x) -> tuple[np.ndarray, np.ndarray]:
     corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
     quads = np.stack([corner, corner + 1, corner + n + 2, corner + n + 1], axis=1)
     triangles = np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return np.stack([x.ravel(), y.ravel(), height(x, y).ravel()], axis=1).astype(np.float32), triangles.astype(np.uint32)
+    return np.stack([x.ravel(), y.ravel(), height(x, y).ravel()], axis=1).astype(np.float32), triangles.astype(
+        np.uint32
+    )
 
 
 def sliding_weights(positions: np.ndarray, bones: int) -> np.ndarray:
@@ -150,7 +152,9 @@ def test_mollified_triangles_equal_the_oracle(sheet):
     reference = (positions.astype(float), triangles.astype(np.int64), oracle.sp.csr_matrix(dense.astype(float)))
     rows = oracle.match(reference, (target.astype(float), target_triangles.astype(np.int64))).rows
     for length in (0.0, 0.1):
-        unknown, expected = oracle.inpaint(target.astype(float), target_triangles.astype(np.int64), matched, rows, length)
+        unknown, expected = oracle.inpaint(
+            target.astype(float), target_triangles.astype(np.int64), matched, rows, length
+        )
         vertices, values = prepared.raw_weights(smoothness_length=length, mask=np.where(matched, 2, 0))
         assert np.array_equal(vertices, unknown) and len(unknown) > 100
         assert np.abs(values - expected).max() <= 1e-6
@@ -162,7 +166,11 @@ def test_prepared_objects_equal_the_function(sheet):
     prepared = native.Inpainting(source, *target)
     for settings in ({}, {"max_influences": 2}, {"smoothing_iterations": 3}, {"max_distance": 0.1}):
         expected = native.transfer_weights(*source_arrays, *target, **settings)
-        for result in (source.transfer(*target, **settings), prepared.solve(**settings), prepared.start(**settings).result()):
+        for result in (
+            source.transfer(*target, **settings),
+            prepared.solve(**settings),
+            prepared.start(**settings).result(),
+        ):
             np.testing.assert_array_equal(result.weights.values, expected.weights.values)
             np.testing.assert_array_equal(result.weights.bones, expected.weights.bones)
         np.testing.assert_array_equal(prepared.matched(**settings), expected.matched)
@@ -172,7 +180,12 @@ def test_prepared_objects_equal_the_function(sheet):
 def test_absolute_lengths_win(sheet):
     source, target = sheet
     report = native.transfer_weights(
-        *source, *target, max_distance=0.123, relative_max_distance=9, smoothness_length=0.5, relative_smoothness_length=9
+        *source,
+        *target,
+        max_distance=0.123,
+        relative_max_distance=9,
+        smoothness_length=0.5,
+        relative_smoothness_length=9,
     ).report
     assert report["max_distance"] == 0.123 and report["smoothness_length"] == 0.5
 
@@ -198,7 +211,9 @@ def test_a_job_reports_finishes_and_cancels(sheet):
     cancelled.cancel()
     with pytest.raises(native.Cancelled):
         cancelled.result()
-    np.testing.assert_array_equal(prepared.start(smoothing_iterations=5).result().weights.values, job.result().weights.values)
+    np.testing.assert_array_equal(
+        prepared.start(smoothing_iterations=5).result().weights.values, job.result().weights.values
+    )
 
 
 def test_errors_are_typed_and_say_what_to_do(sheet):
@@ -217,16 +232,33 @@ def test_errors_are_typed_and_say_what_to_do(sheet):
             native.transfer_weights(**(arrays | changes))
 
     assert issubclass(native.SkinwrightError, ValueError)
-    run(native.NothingMatched, r"distance now in force, 0\.0\d+; the smallest .* is 10\.", target_positions=target + [0, 0, 10])
+    run(
+        native.NothingMatched,
+        r"distance now in force, 0\.0\d+; the smallest .* is 10\.",
+        target_positions=target + np.float32([0, 0, 10]),
+    )
     run(native.NothingMatched, "no distance would help", mask=np.zeros(len(target)))
     not_finite = target.copy()
     not_finite[9, 1] = np.inf
     run(native.InvalidMesh, "target mesh .* vertex 9", target_positions=not_finite)
-    run(native.InvalidMesh, "triangle 1 of the source mesh names vertex 70000", source_triangles=[[0, 1, 2], [0, 1, 70000]])
+    run(
+        native.InvalidMesh,
+        "triangle 1 of the source mesh names vertex 70000",
+        source_triangles=[[0, 1, 2], [0, 1, 70000]],
+    )
     run(native.InvalidMesh, "target mesh has no triangles", target_triangles=np.zeros((0, 3)))
-    run(native.InvalidMesh, "source mesh", source_positions=np.zeros((0, 3)), source_weights=native.Weights([0], [], [], 5))
+    run(
+        native.InvalidMesh,
+        "source mesh",
+        source_positions=np.zeros((0, 3)),
+        source_weights=native.Weights([0], [], [], 5),
+    )
     run(native.InvalidParameter, r"shape \(N, 3\), not", target_positions=target[:, :2])
-    run(native.InvalidParameter, "source weights has 4 entries where", source_weights=native.Weights.from_dense(np.eye(4)))
+    run(
+        native.InvalidParameter,
+        "source weights has 4 entries where",
+        source_weights=native.Weights.from_dense(np.eye(4)),
+    )
     run(native.InvalidParameter, "mask has 3 entries", mask=[0, 1, 2])
     run(native.InvalidParameter, "mask is 7 at vertex 0", mask=np.full(len(target), 7))
     run(native.InvalidParameter, "max_distance is -1", max_distance=-1.0)
