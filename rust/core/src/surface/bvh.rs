@@ -28,7 +28,7 @@ pub(super) struct Leaf {
     pub(super) triangles: [u32; WIDTH],
 }
 
-/// Up to eight boxes in a common frame, lane by lane.
+/// Up to eight boxes in a common frame, lane by lane; those missing are infinitely far.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(super) struct Node {
@@ -36,7 +36,6 @@ pub(super) struct Node {
     high: [[f32; WIDTH]; 3],
     /// Node indices, or leaf indices marked with [`LEAF`].
     pub(super) children: [u32; WIDTH],
-    pub(super) child_count: usize,
     origin: [f32; 3],
     /// The frame's axes in world space.
     axes: [[f32; 3]; 3],
@@ -88,10 +87,9 @@ impl Node {
     fn new(children: &[(u32, Aabb)]) -> Self {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut node = Self {
-            low: Default::default(),
-            high: Default::default(),
+            low: [[f32::INFINITY; WIDTH]; 3],
+            high: [[f32::NEG_INFINITY; WIDTH]; 3],
             children: [0; WIDTH],
-            child_count: children.len(),
             origin: [0.0; 3],
             axes,
         };
@@ -107,7 +105,6 @@ impl Node {
         let origin = leaves[0].corners_from(DVec3::ZERO, 0)[0];
         let frame = frame_of(leaves);
         let mut node = Self::new(&[]);
-        node.child_count = leaves.len();
         node.origin = origin.as_vec3().to_array();
         node.axes = frame.as_mat3().transpose().to_cols_array_2d();
         let axes = DMat3::from_cols_array_2d(&node.axes.map(|axis| axis.map(f64::from))).transpose();
@@ -135,13 +132,18 @@ impl Node {
         let local = self.axes.map(|a| a[0] * from_origin[0] + a[1] * from_origin[1] + a[2] * from_origin[2]);
         let mut squared = [0.0; WIDTH];
         for lane in 0..WIDTH {
-            for axis in 0..3 {
-                let outside = (self.low[axis][lane] - local[axis]).max(local[axis] - self.high[axis][lane]).max(0.0);
-                squared[lane] += outside * outside;
-            }
+            let [x, y, z] = [0, 1, 2].map(|k| outside(self.low[k][lane] - local[k], local[k] - self.high[k][lane]));
+            squared[lane] = x * x + y * y + z * z;
         }
         squared
     }
+}
+
+/// How far beyond an interval, from the signed distances to its ends.
+#[inline(always)]
+fn outside(below: f32, above: f32) -> f32 {
+    let farther = if below > above { below } else { above };
+    if farther > 0.0 { farther } else { 0.0 }
 }
 
 impl Bvh {

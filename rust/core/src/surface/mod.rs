@@ -58,7 +58,10 @@ impl SurfaceIndex {
         let order = morton::order(queries);
         let mut along_curve = vec![SurfacePoint::default(); queries.len()];
         let batches = order.par_chunks(BATCH).zip(along_curve.par_chunks_mut(BATCH));
-        batches.for_each(|(order, answers)| self.answer(queries, order, answers));
+        batches.for_each(|(order, answers)| {
+            let queries: Vec<_> = order.iter().map(|&i| queries[i as usize]).collect();
+            self.answer(&queries, answers);
+        });
         let mut answers = vec![SurfacePoint::default(); queries.len()];
         for (&i, &answer) in order.iter().zip(&along_curve) {
             answers[i as usize] = answer;
@@ -69,11 +72,11 @@ impl SurfaceIndex {
     /// Exact closest point for one query, world space.
     pub fn closest_point(&self, query: [f32; 3]) -> SurfacePoint {
         let mut answer = [SurfacePoint::default()];
-        self.answer(&[query], &[0], &mut answer);
+        self.answer(&[query], &mut answer);
         answer[0]
     }
 
-    fn answer(&self, queries: &[[f32; 3]], order: &[u32], answers: &mut [SurfacePoint]) {
-        Arch::new().dispatch(Batch { bvh: &self.bvh, queries, order, answers });
+    fn answer(&self, queries: &[[f32; 3]], answers: &mut [SurfacePoint]) {
+        Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
     }
 }

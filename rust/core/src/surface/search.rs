@@ -16,9 +16,6 @@ const BOX_SLACK: f64 = 1e-5;
 pub(super) struct Batch<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) queries: &'a [[f32; 3]],
-    /// Which of the queries.
-    pub(super) order: &'a [u32],
-    /// Where the answers go, in that order.
     pub(super) answers: &'a mut [SurfacePoint],
 }
 
@@ -29,8 +26,7 @@ impl WithSimd for Batch<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let mut stack = Vec::new();
         let mut start = 0;
-        for (&i, answer) in self.order.iter().zip(self.answers) {
-            let query = self.queries[i as usize];
+        for (&query, answer) in self.queries.iter().zip(self.answers) {
             let nearest = nearest(self.bvh, query, start, &mut stack);
             start = nearest.leaf;
             *answer = nearest.surface_point(self.bvh, query);
@@ -63,7 +59,7 @@ impl Nearest {
         for lane in 0..WIDTH {
             squared[lane] = closest_to_origin(stored.corners_from(query, lane)).1;
         }
-        for lane in 0..WIDTH {
+        for lane in lanes(squared.map(|s| s <= self.squared)) {
             let triangle = stored.triangles[lane];
             if squared[lane] < self.squared || (squared[lane] == self.squared && triangle < self.triangle) {
                 *self = Self { squared: squared[lane], triangle, leaf, lane };
@@ -101,13 +97,25 @@ fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) 
         let squared = node.squared_distances(query);
         let limit = best.limit();
         let bottom = stack.len();
-        for lane in 0..node.child_count {
-            if squared[lane] <= limit {
-                insert_descending(stack, bottom, (squared[lane], node.children[lane]));
-            }
+        for lane in lanes(squared.map(|s| s <= limit)) {
+            insert_descending(stack, bottom, (squared[lane], node.children[lane]));
         }
     }
     best
+}
+
+/// The lanes that are set, in order.
+#[inline(always)]
+fn lanes(set: [bool; WIDTH]) -> impl Iterator<Item = usize> {
+    let mut mask = 0_u32;
+    for (lane, &is_set) in set.iter().enumerate() {
+        mask |= u32::from(is_set) << lane;
+    }
+    std::iter::from_fn(move || {
+        let lane = mask.trailing_zeros() as usize;
+        mask &= mask.wrapping_sub(1);
+        (lane < WIDTH).then_some(lane)
+    })
 }
 
 /// Inserts into `stack[bottom..]`, whose last is the nearest.
