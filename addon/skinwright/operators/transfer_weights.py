@@ -66,9 +66,9 @@ class SKINWRIGHT_OT_transfer_weights(TransferOptions, Operator):
         except (SceneError, native.NativeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for warning in report.all_warnings():
-            self.report({"WARNING"}, warning)
         self.report({"INFO"}, report.sentence())
+        for warning in report.all_warnings():  # last, as the status bar shows the last
+            self.report({"WARNING"}, warning)
         return {"FINISHED"}
 
 
