@@ -14,32 +14,40 @@ pub(super) fn fill(
 ) -> Result<Vec<Row>> {
     let proximity = proximities(parents)?;
     let count = parents.len();
-    let candidates: Vec<u32> = (0..count as u32).filter(|&bone| !is_locked(bone)).collect();
+    let closed: Vec<f64> = (0..count as u32).map(|bone| if is_locked(bone) { NEVER } else { 0.0 }).collect();
     let fill_row = |score: &mut Vec<f64>, mut row: Row| {
-        score.fill(0.0);
+        score.copy_from_slice(&closed);
         for &(bone, weight) in &row {
             let near = &proximity[bone as usize * count..][..count];
             score.iter_mut().zip(near).for_each(|(s, p)| *s += weight * p);
         }
-        let own = row.len();
-        let mut best: Vec<u32> = Vec::with_capacity(n);
-        for &bone in candidates.iter().filter(|&&bone| row.iter().all(|r| r.0 != bone)) {
-            insert_best(&mut best, bone, n.saturating_sub(own), |a, b| score[a as usize] > score[b as usize]);
-        }
-        row.extend(best.iter().map(|&bone| (bone, 0.0)));
-        row.sort_by_key(|&(bone, _)| bone);
+        row.iter().for_each(|&(bone, _)| score[bone as usize] = NEVER);
+        let wanted = n.saturating_sub(row.len());
+        row.extend(best(score, wanted).into_iter().map(|bone| (bone, 0.0)));
+        row.sort_unstable_by_key(|&(bone, _)| bone);
         row
     };
     Ok(kept.into_par_iter().with_min_len(256).map_init(|| vec![0.0; count], fill_row).collect())
 }
 
-/// Keeps the `limit` best of the items seen so far, best first; of equals the one seen first.
-fn insert_best(best: &mut Vec<u32>, item: u32, limit: usize, better: impl Fn(u32, u32) -> bool) {
-    let at = best.iter().rposition(|&other| !better(item, other)).map_or(0, |i| i + 1);
-    if at < limit {
-        best.truncate(limit - 1);
-        best.insert(at, item);
+/// The score of a bone that may not be given.
+const NEVER: f64 = f64::NEG_INFINITY;
+
+/// The bones of highest score, at most `wanted`; of equals the first.
+fn best(score: &[f64], wanted: usize) -> Vec<u32> {
+    let mut best: Vec<u32> = Vec::with_capacity(wanted + 1);
+    let mut least = NEVER;
+    for (bone, &s) in (0..).zip(score) {
+        if s > least && wanted > 0 {
+            let at = best.partition_point(|&other| score[other as usize] >= s);
+            best.insert(at, bone);
+            best.truncate(wanted);
+            if best.len() == wanted {
+                least = score[best[wanted - 1] as usize];
+            }
+        }
     }
+    best
 }
 
 /// 0.5^hops between all bones, (B, B), zero between bones under different roots.

@@ -68,7 +68,8 @@ type Row = Vec<(u32, f64)>;
 
 /// The influences a vertex keeps, sorted by bone: everything locked, then the largest, ties by bone order.
 fn kept_influences((bones, values): (&[u32], &[f32]), n: usize, is_locked: impl Fn(u32) -> bool) -> Row {
-    let mut row: Row = bones.iter().copied().zip(values.iter().map(|&x| f64::from(x))).collect();
+    let mut row = Row::with_capacity(n.max(bones.len()));
+    row.extend(bones.iter().copied().zip(values.iter().map(|&x| f64::from(x))));
     row.sort_by_key(|&(bone, _)| bone);
     row.dedup_by(|(bone, value), (first, sum)| bone == first && (*sum += *value, true).1);
     row.retain(|&(bone, value)| value > 0.0 || is_locked(bone));
