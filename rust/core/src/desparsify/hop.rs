@@ -1,33 +1,26 @@
 //! Candidates by distance in the bone hierarchy.
 
-use rayon::prelude::*;
-
-use super::Row;
 use crate::error::{Error, Result};
+use crate::weights::Weights;
 
 /// Fills each row with the bones of highest score, score(b) = sum over influences i of w_i 0.5^hops(i, b).
-pub(super) fn fill(
-    kept: Vec<Row>,
-    n: usize,
-    parents: &[i32],
-    is_locked: impl Fn(u32) -> bool + Sync,
-) -> Result<Vec<Row>> {
+pub(super) fn fill(kept: &Weights, n: usize, parents: &[i32], locked: &[bool]) -> Result<Weights> {
     let proximity = proximities(parents)?;
     let count = parents.len();
-    let closed: Vec<f64> = (0..count as u32).map(|bone| if is_locked(bone) { NEVER } else { 0.0 }).collect();
-    let fill_row = |score: &mut Vec<f64>, mut row: Row| {
-        score.copy_from_slice(&closed);
-        for &(bone, weight) in &row {
+    let open: Vec<f64> = locked.iter().map(|&locked| if locked { NEVER } else { 0.0 }).collect();
+    let row = |score: &mut Vec<f64>, i: usize, out: &mut Vec<(u32, f32)>| {
+        let (bones, values) = kept.row(i);
+        score.copy_from_slice(&open);
+        for (&bone, &weight) in bones.iter().zip(values) {
             let near = &proximity[bone as usize * count..][..count];
-            score.iter_mut().zip(near).for_each(|(s, p)| *s += weight * p);
+            score.iter_mut().zip(near).for_each(|(s, p)| *s += f64::from(weight) * p);
         }
-        row.iter().for_each(|&(bone, _)| score[bone as usize] = NEVER);
-        let wanted = n.saturating_sub(row.len());
-        row.extend(best(score, wanted).into_iter().map(|bone| (bone, 0.0)));
-        row.sort_unstable_by_key(|&(bone, _)| bone);
-        row
+        bones.iter().for_each(|&bone| score[bone as usize] = NEVER);
+        out.extend(bones.iter().copied().zip(values.iter().copied()));
+        out.extend(best(score, n.saturating_sub(bones.len())).into_iter().map(|bone| (bone, 0.0)));
+        out.sort_unstable_by_key(|&(bone, _)| bone);
     };
-    Ok(kept.into_par_iter().with_min_len(256).map_init(|| vec![0.0; count], fill_row).collect())
+    Ok(Weights::from_rows(kept.vertex_count(), kept.n_bones(), || vec![0.0; count], row))
 }
 
 /// The score of a bone that may not be given.

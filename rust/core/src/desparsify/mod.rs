@@ -5,7 +5,6 @@ mod hop;
 mod surface;
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
@@ -53,35 +52,42 @@ pub fn desparsify(
     mesh: Option<&TriMesh<'_>>,
 ) -> Result<Weights> {
     check(weights, n, skeleton)?;
-    let is_locked = |bone: u32| skeleton.locked.get(bone as usize).copied().unwrap_or(false);
-    let kept: Vec<Row> =
-        (0..weights.vertex_count()).into_par_iter().map(|i| kept_influences(weights.row(i), n, is_locked)).collect();
-    let rows = match method {
-        Method::Hop => hop::fill(kept, n, skeleton.parents, is_locked)?,
-        Method::Surface => surface::fill(kept, n, surface_of(weights, mesh)?, &segments(weights, skeleton)?, is_locked),
-    };
-    Ok(Weights::from_rows(rows.iter().map(Vec::as_slice), weights.n_bones()))
+    let mut locked = skeleton.locked.to_vec();
+    locked.resize(weights.n_bones() as usize, false);
+    let keep =
+        |row: &mut Vec<(u32, f64)>, i: usize, out: &mut Vec<(u32, f32)>| keep(weights.row(i), n, &locked, row, out);
+    let kept = Weights::from_rows(weights.vertex_count(), weights.n_bones(), Vec::new, keep);
+    match method {
+        Method::Hop => hop::fill(&kept, n, skeleton.parents, &locked),
+        Method::Surface => {
+            Ok(surface::fill(&kept, n, surface_of(weights, mesh)?, &segments(weights, skeleton)?, &locked))
+        }
+    }
 }
 
-/// The members of one vertex as (bone, weight).
-type Row = Vec<(u32, f64)>;
-
-/// The influences a vertex keeps, sorted by bone: everything locked, then the largest, ties by bone order.
-fn kept_influences((bones, values): (&[u32], &[f32]), n: usize, is_locked: impl Fn(u32) -> bool) -> Row {
-    let mut row = Row::with_capacity(n.max(bones.len()));
+/// The influences a vertex keeps, sorted by bone: everything locked, then the largest, ties by bone order. The free ones
+/// are scaled to fill what the locked ones leave of 1.
+fn keep(
+    (bones, values): (&[u32], &[f32]),
+    n: usize,
+    locked: &[bool],
+    row: &mut Vec<(u32, f64)>,
+    out: &mut Vec<(u32, f32)>,
+) {
+    let is_locked = |bone: u32| locked[bone as usize];
+    row.clear();
     row.extend(bones.iter().copied().zip(values.iter().map(|&x| f64::from(x))));
     row.sort_by_key(|&(bone, _)| bone);
     row.dedup_by(|(bone, value), (first, sum)| bone == first && (*sum += *value, true).1);
     row.retain(|&(bone, value)| value > 0.0 || is_locked(bone));
     row.sort_by(|a, b| is_locked(b.0).cmp(&is_locked(a.0)).then(b.1.total_cmp(&a.1)));
-    let locked = row.iter().filter(|&&(bone, _)| is_locked(bone)).count();
-    row.truncate(n.max(locked));
-    let (held, free) = row.split_at_mut(locked);
-    let mass = (1.0 - held.iter().map(|r| r.1).sum::<f64>()).max(0.0);
-    let sum: f64 = free.iter().map(|r| r.1).sum();
-    free.iter_mut().for_each(|r| r.1 *= mass / sum);
+    let held = row.iter().filter(|&&(bone, _)| is_locked(bone)).count();
+    row.truncate(n.max(held));
+    let sum = |row: &[(u32, f64)]| row.iter().map(|r| r.1).sum::<f64>();
+    let scale = (1.0 - sum(&row[..held])).max(0.0) / sum(&row[held..]);
+    row[held..].iter_mut().for_each(|r| r.1 *= scale);
     row.sort_by_key(|&(bone, _)| bone);
-    row
+    out.extend(row.iter().map(|&(bone, value)| (bone, value as f32)));
 }
 
 fn check(weights: &Weights, n: usize, skeleton: &Skeleton<'_>) -> Result<()> {

@@ -6,35 +6,32 @@ use std::collections::BinaryHeap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Row;
 use crate::mesh::TriMesh;
+use crate::weights::Weights;
 
 /// Fills each row with the nearest bones, by distance along mesh edges from the region where the bone weighs
 /// anything, then by distance to the bone itself, then by bone order. Bones that no edge path reaches come last.
-pub(super) fn fill(
-    kept: Vec<Row>,
-    n: usize,
-    mesh: &TriMesh<'_>,
-    segments: &[[DVec3; 2]],
-    is_locked: impl Fn(u32) -> bool + Sync,
-) -> Vec<Row> {
-    let labels = spread(&kept, n, &Edges::of(mesh), &is_locked);
-    let fill_row = |(i, (mut row, near)): (usize, (Row, Vec<Label>))| {
+pub(super) fn fill(kept: &Weights, n: usize, mesh: &TriMesh<'_>, segments: &[[DVec3; 2]], locked: &[bool]) -> Weights {
+    let labels = spread(kept, n, &Edges::of(mesh), locked);
+    let row = |found: &mut Vec<(f64, f64, u32)>, i: usize, out: &mut Vec<(u32, f32)>| {
+        let (bones, values) = kept.row(i);
         let position = mesh.position(i as u32);
-        let distance = |bone: u32| distance_to_segment(position, segments[bone as usize]);
-        let mut found: Vec<(f64, f64, u32)> =
-            near.iter().filter(|l| !has(&row, l.bone)).map(|l| (l.distance, distance(l.bone), l.bone)).collect();
-        if row.len() + found.len() < n {
-            let unreached = |&b: &u32| !is_locked(b) && !has(&row, b) && near.iter().all(|l| l.bone != b);
-            let rest = (0..segments.len() as u32).filter(unreached);
-            found.extend(rest.map(|bone| (f64::INFINITY, distance(bone), bone)));
+        let to_bone = |bone: u32| distance_to_segment(position, segments[bone as usize]);
+        let near = labels[i].iter().filter(|l| !bones.contains(&l.bone));
+        found.clear();
+        found.extend(near.map(|l| (l.distance, to_bone(l.bone), l.bone)));
+        let wanted = n.saturating_sub(bones.len());
+        if found.len() < wanted {
+            let is_known = |bone: u32| bones.contains(&bone) || labels[i].iter().any(|l| l.bone == bone);
+            let unreached = (0..kept.n_bones()).filter(|&bone| !locked[bone as usize] && !is_known(bone));
+            found.extend(unreached.map(|bone| (f64::INFINITY, to_bone(bone), bone)));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-        row.extend(found.iter().take(n.saturating_sub(row.len())).map(|&(_, _, bone)| (bone, 0.0)));
-        row.sort_by_key(|&(bone, _)| bone);
-        row
+        out.extend(bones.iter().copied().zip(values.iter().copied()));
+        out.extend(found.iter().take(wanted).map(|&(_, _, bone)| (bone, 0.0)));
+        out.sort_unstable_by_key(|&(bone, _)| bone);
     };
-    kept.into_par_iter().zip(labels).enumerate().with_min_len(256).map(fill_row).collect()
+    Weights::from_rows(kept.vertex_count(), kept.n_bones(), Vec::new, row)
 }
 
 /// A bone and how far along the surface its region is.
@@ -48,9 +45,10 @@ struct Label {
 ///
 /// A bone that is among the `n` nearest of a vertex is so all along its shortest path there, so nothing else needs to
 /// be carried on, and the answer is exact.
-fn spread(kept: &[Row], n: usize, edges: &Edges, is_locked: impl Fn(u32) -> bool) -> Vec<Vec<Label>> {
-    let own = |row: &Row| row.iter().filter(|r| !is_locked(r.0)).map(|r| Label { bone: r.0, distance: 0.0 }).collect();
-    let mut labels: Vec<Vec<Label>> = kept.iter().map(own).collect();
+fn spread(kept: &Weights, n: usize, edges: &Edges, locked: &[bool]) -> Vec<Vec<Label>> {
+    let own = |i: usize| kept.row(i).0.iter().copied().filter(|&bone| !locked[bone as usize]);
+    let start = |i: usize| own(i).map(|bone| Label { bone, distance: 0.0 }).collect();
+    let mut labels: Vec<Vec<Label>> = (0..kept.vertex_count()).map(start).collect();
     // Positive floats order as their bits do. Reverse: the heap gives the nearest first.
     let mut queue = BinaryHeap::new();
     let relax = |labels: &mut [Vec<Label>], queue: &mut BinaryHeap<_>, from: u32, bone: u32, distance: f64| {
@@ -61,8 +59,8 @@ fn spread(kept: &[Row], n: usize, edges: &Edges, is_locked: impl Fn(u32) -> bool
             }
         }
     };
-    for (i, row) in kept.iter().enumerate() {
-        for &(bone, _) in row.iter().filter(|r| !is_locked(r.0)) {
+    for i in 0..kept.vertex_count() {
+        for bone in own(i) {
             relax(&mut labels, &mut queue, i as u32, bone, 0.0);
         }
     }
@@ -95,10 +93,6 @@ fn offer(known: &mut Vec<Label>, n: usize, label: Label) -> bool {
 
 fn nearer(known: &[Label], distance: f64) -> usize {
     known.iter().filter(|l| l.distance < distance).count()
-}
-
-fn has(row: &Row, bone: u32) -> bool {
-    row.iter().any(|r| r.0 == bone)
 }
 
 fn distance_to_segment(point: DVec3, [head, tail]: [DVec3; 2]) -> f64 {

@@ -15,7 +15,6 @@ mod vertex;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use range_of_motion::range_of_motion;
 pub use residual::Residuals;
 pub use simplex_qp::SimplexQp;
 pub use stroke::Stroke;
@@ -79,8 +78,8 @@ impl SculptSolver {
     /// Prepares `rest_positions` (V, mesh space) with their `weights`; `locked` (B, or empty for none) bones keep theirs.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`], [`Error::PositionNotFinite`], [`Error::InvalidWeights`] for a negative weight or a
-    /// vertex with more than [`MAX_MEMBERS`], [`Error::InvalidParameter`].
+    /// [`Error::LengthMismatch`], [`Error::PositionNotFinite`], [`Error::WeightNegative`], [`Error::InvalidWeights`] for a
+    /// vertex with more members than [`MAX_MEMBERS`], [`Error::InvalidParameter`].
     pub fn new(rest_positions: &[[f32; 3]], weights: Weights, locked: &[bool], options: Options) -> Result<Self> {
         check(rest_positions, &weights, locked, options)?;
         let rest: Vec<DVec3> = rest_positions.iter().map(|&p| Vec3::from(p).as_dvec3()).collect();
@@ -255,8 +254,8 @@ fn check(rest_positions: &[[f32; 3]], weights: &Weights, locked: &[bool], option
             );
             return Err(Error::InvalidWeights { reason });
         }
-        if values.iter().any(|&x| x < 0.0) {
-            return Err(Error::InvalidWeights { reason: format!("vertex {i} has a negative weight") });
+        if let Some(at) = values.iter().position(|&x| x < 0.0) {
+            return Err(Error::WeightNegative { vertex: i, bone: bones[at] });
         }
     }
     Ok(())

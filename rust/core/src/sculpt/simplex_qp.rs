@@ -68,11 +68,8 @@ impl<const N: usize> SimplexQp<N> {
             let row = face.members[i];
             let (mut pivot, mut x, mut y) = (self.h[row][row], self.g[row], 1.0);
             for j in 0..i {
-                let mut entry = self.entry(row, face.members[j]);
-                for k in 0..j {
-                    entry -= l[i][k] * l[j][k];
-                }
-                entry *= l[j][j];
+                let known: f64 = l[i].iter().zip(&l[j]).take(j).map(|(x, y)| x * y).sum();
+                let entry = (self.entry(row, face.members[j]) - known) * l[j][j];
                 l[i][j] = entry;
                 pivot -= entry * entry;
                 x -= entry * a[j];

@@ -94,9 +94,9 @@ impl SculptSolver {
     /// H = sum of alpha E'E over targets and guards, members free ones first.
     fn quadratic<const N: usize>(&self, i: usize, members: &FreeFirst<N>) -> [[f64; N]; N] {
         let mut h = [[0.0; N]; N];
-        for a in 0..members.len {
-            for b in 0..=a {
-                h[a][b] = self.guards.entry(i, members.order[a], members.order[b]);
+        for (a, row) in h.iter_mut().enumerate().take(members.len) {
+            for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
+                *entry = self.guards.entry(i, members.order[a], members.order[b]);
             }
         }
         for target in &self.targets[i] {
@@ -104,9 +104,9 @@ impl SculptSolver {
             let mut offsets = [DVec3::ZERO; N];
             self.offsets(i, &pose.pose_from_rest, target.position, &mut offsets);
             let e = members.order.map(|a| offsets[a]);
-            for a in 0..members.len {
-                for b in 0..=a {
-                    h[a][b] += pose.alpha * e[a].dot(e[b]);
+            for (a, row) in h.iter_mut().enumerate().take(members.len) {
+                for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
+                    *entry += pose.alpha * e[a].dot(e[b]);
                 }
             }
         }
