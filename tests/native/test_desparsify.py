@@ -150,9 +150,7 @@ def test_posing_does_not_change_when_nothing_is_dropped():
     pose = np.tile(np.eye(4), (len(parents), 1, 1))
     pose[:, :3] += rng.normal(size=(len(parents), 3, 4))
     sparse = native.Weights.from_dense(weights)
-    more = native.desparsify(
-        sparse, parents, n=6, positions=positions, triangles=triangles, bone_segments=segments
-    )
+    more = native.desparsify(sparse, parents, n=6, positions=positions, triangles=triangles, bone_segments=segments)
     before, after = (native.linear_blend(positions, w, pose) for w in (sparse, more))
     np.testing.assert_allclose(after, before, atol=1e-4)
 

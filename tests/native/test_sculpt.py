@@ -222,7 +222,9 @@ def test_refuses_what_it_cannot_use():
     with pytest.raises(native.InvalidParameter, match="kappa is 0, but it must be more than 0"):
         native.SculptSolver(rest, weights, kappa=0)
     many = native.Weights([0, 13], np.arange(13), np.full(13, 1 / 13), 13)
-    with pytest.raises(native.InvalidWeights, match="vertex 0 has 13 influences, sculpting takes at most 12: desparsify first"):
+    with pytest.raises(
+        native.InvalidWeights, match="vertex 0 has 13 influences, sculpting takes at most 12: desparsify first"
+    ):
         native.SculptSolver(rest[:1], many)
     with pytest.raises(native.InvalidMesh, match="not finite at vertex 0"):
         native.SculptSolver(rest * np.nan, weights)
