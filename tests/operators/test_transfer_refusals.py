@@ -205,6 +205,20 @@ class TestTarget:
             plain(body, curve)
 
 
+@pytest.mark.parametrize("flaw", [float("nan"), -0.5, 0.5])
+def test_an_answer_that_is_no_set_of_weights_is_not_written(addon, body, coat, monkeypatch, flaw):
+    real = addon.native.Source.transfer
+
+    def flawed(*arguments, **keywords):
+        transfer, rows = real(*arguments, **keywords)
+        values = rows.values.copy()
+        values[rows.indptr[7]] += flaw
+        return transfer, rows._replace(values=values)
+
+    monkeypatch.setattr(addon.native.Source, "transfer", flawed)
+    refused("Coat: the answer is no set of weights", coat)
+
+
 class TestLinked:
     """Data of other files: a linked body may give, a linked garment cannot take."""
 

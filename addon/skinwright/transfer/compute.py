@@ -70,6 +70,7 @@ def _bone_rows(bones: native.Source, garment: Garment, params: TransferParams) -
     # Where old weights join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
     transfer, rows = _transfer(bones, garment, params, limit)
+    _check(garment, rows, limit)
     if joined:
         rows = merging.merge(
             rows,
@@ -79,6 +80,15 @@ def _bone_rows(bones: native.Source, garment: Garment, params: TransferParams) -
             max_influences=params.max_influences,
         )
     return transfer, rows
+
+
+def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
+    """A last look at what the library answers: nothing that is not a set of weights is ever written."""
+    counts = np.diff(rows.indptr)
+    sums = csr.row_sums(rows)[counts > 0]
+    sound = np.isfinite(rows.values).all() and (rows.values >= 0).all() and (np.abs(sums - 1) < 1e-5).all()
+    if not sound or (max_influences and counts.max(initial=0) > max_influences):
+        raise native.NativeError(f"{garment.object.name}: the answer is no set of weights; please report this")
 
 
 def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> tuple[Any, Rows]:

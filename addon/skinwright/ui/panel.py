@@ -65,12 +65,8 @@ class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):
     bl_label = "Matching"
 
     def draw_settings(self, layout: UILayout, context: Context) -> None:
-        """Shapes and thresholds."""
-        settings = context.scene.skinwright.transfer
-        layout.prop(settings, "geometry")
-        _length(layout, settings, "distance_mode", "relative_max_distance", "max_distance")
-        layout.prop(settings, "max_normal_angle")
-        layout.prop(settings, "match_flipped_normals")
+        """As the operator lays them out."""
+        context.scene.skinwright.transfer.draw_matching(layout)
 
 
 class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
@@ -101,14 +97,8 @@ class SKINWRIGHT_PT_transfer_inpainting(_TransferStep, Panel):
     bl_label = "Inpainting"
 
     def draw_settings(self, layout: UILayout, context: Context) -> None:
-        """The solve, loose parts, smoothing."""
-        settings = context.scene.skinwright.transfer
-        _length(layout, settings, "smoothness_mode", "relative_smoothness_length", "smoothness_length")
-        layout.prop(settings, "island_policy")
-        layout.prop(settings, "smoothing_iterations")
-        column = layout.column()
-        column.active = settings.smoothing_iterations > 0
-        column.prop(settings, "smoothing_factor", text="Factor")
+        """As the operator lays them out."""
+        context.scene.skinwright.transfer.draw_inpainting(layout)
 
 
 class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
@@ -117,19 +107,8 @@ class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
     bl_label = "Writing"
 
     def draw_settings(self, layout: UILayout, context: Context) -> None:
-        """Limit, mix, and what else may change."""
-        settings = context.scene.skinwright.transfer
-        layout.prop(settings, "max_influences")
-        layout.prop(settings, "mix_factor")
-        layout.prop(settings, "selected_only")
-        layout.prop(settings, "add_armature")
-        layout.prop(settings, "make_single_user")
-
-
-def _length(layout: UILayout, settings: bpy.types.PropertyGroup, mode: str, relative: str, absolute: str) -> None:
-    row = layout.row(align=True)
-    row.prop(settings, relative if getattr(settings, mode) == "RELATIVE" else absolute)
-    row.prop(settings, mode, text="")
+        """As the operator lays them out."""
+        context.scene.skinwright.transfer.draw_writing(layout)
 
 
 def _alert(layout: UILayout, sentence: str) -> None:
