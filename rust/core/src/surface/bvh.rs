@@ -128,9 +128,9 @@ impl Node {
         let from_origin = [0, 1, 2].map(|k| query[k] - self.origin[k]);
         let local = self.axes.map(|a| a[0] * from_origin[0] + a[1] * from_origin[1] + a[2] * from_origin[2]);
         let mut squared = [0.0; WIDTH];
-        for lane in 0..WIDTH {
+        for (lane, squared) in squared.iter_mut().enumerate() {
             let [x, y, z] = [0, 1, 2].map(|k| outside(self.low[k][lane] - local[k], local[k] - self.high[k][lane]));
-            squared[lane] = x * x + y * y + z * z;
+            *squared = x * x + y * y + z * z;
         }
         squared
     }
