@@ -1,6 +1,22 @@
 //! Sparse Cholesky for symmetric positive definite matrices of surface meshes, many right-hand sides at once.
 
+mod blocks;
+mod buffer;
+mod dissection;
+mod factor;
+mod graph;
+mod kernels;
+mod multifrontal;
+mod solve;
+mod supernodal;
+mod tree;
+mod vertex_cover;
+mod walk;
+
 use glam::Vec3;
+
+use multifrontal::Multifrontal;
+use supernodal::Supernodal;
 
 /// Lower triangle (diagonal included) of a symmetric matrix, compressed by column, rows ascending.
 #[derive(Debug, Clone, Default)]
@@ -13,6 +29,18 @@ pub struct SymmetricMatrix {
     pub values: Vec<f64>,
 }
 
+impl SymmetricMatrix {
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        self.column_starts.len().saturating_sub(1)
+    }
+
+    /// Diagonal entry of `unknown`.
+    pub fn diagonal(&self, unknown: usize) -> f64 {
+        self.values[self.column_starts[unknown]]
+    }
+}
+
 /// The matrix is not positive definite: the pivot of this unknown was not positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NotPositive {
@@ -20,9 +48,37 @@ pub struct NotPositive {
     pub unknown: usize,
 }
 
+/// A pivot at or below this is zero but for rounding, `diagonal` being the entry it started from.
+fn pivot_floor(diagonal: f64) -> f64 {
+    64.0 * f64::EPSILON * diagonal
+}
+
+/// How a matrix is factored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Coordinate nested dissection and fronts on all threads; for surfaces.
+    Multifrontal,
+    /// Minimum degree and supernodes on one thread; for graphs that do not follow their positions.
+    Supernodal,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 2] = [Self::Multifrontal, Self::Supernodal];
+}
+
 /// A Cholesky factorisation, kept for as many solves as wanted.
 #[derive(Debug)]
-pub struct Cholesky {}
+pub struct Cholesky {
+    factor: Factor,
+}
+
+#[derive(Debug)]
+enum Factor {
+    Empty,
+    Multifrontal(Box<Multifrontal>),
+    Supernodal(Box<Supernodal>),
+}
 
 impl Cholesky {
     /// Factors `matrix` (n unknowns). `positions` (n) guide the ordering only; the answer does not depend on them
@@ -30,12 +86,42 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NotPositive`] with the offending unknown.
-    pub fn factor(_matrix: &SymmetricMatrix, _positions: &[Vec3]) -> Result<Self, NotPositive> {
-        unimplemented!()
+    pub fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
+        Self::factor_with(Method::Multifrontal, matrix, positions)
+    }
+
+    /// The same with a method of choice. Where separators turn out large, `Multifrontal` gives way to `Supernodal`.
+    ///
+    /// # Errors
+    /// [`NotPositive`] with the offending unknown.
+    pub fn factor_with(method: Method, matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
+        if matrix.size() == 0 {
+            return Ok(Self { factor: Factor::Empty });
+        }
+        if method == Method::Multifrontal
+            && let Some(factor) = Multifrontal::factor(matrix, positions)?
+        {
+            return Ok(Self { factor: Factor::Multifrontal(Box::new(factor)) });
+        }
+        Ok(Self { factor: Factor::Supernodal(Box::new(Supernodal::factor(matrix)?)) })
     }
 
     /// Solves in place for `columns` right-hand sides: `rhs` is (n, columns), row-major.
-    pub fn solve_in_place(&self, _rhs: &mut [f64], _columns: usize) {
-        unimplemented!()
+    pub fn solve_in_place(&self, rhs: &mut [f64], columns: usize) {
+        match &self.factor {
+            _ if columns == 0 => {}
+            Factor::Empty => {}
+            Factor::Multifrontal(factor) => factor.solve_in_place(rhs, columns),
+            Factor::Supernodal(factor) => factor.solve_in_place(rhs, columns),
+        }
+    }
+
+    /// Number of entries the factor stores.
+    pub fn stored(&self) -> usize {
+        match &self.factor {
+            Factor::Empty => 0,
+            Factor::Multifrontal(factor) => factor.stored(),
+            Factor::Supernodal(factor) => factor.stored(),
+        }
     }
 }
