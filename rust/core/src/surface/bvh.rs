@@ -4,13 +4,10 @@
 //! which is then collapsed to eight children a node. The boxes of a patch's leaves lie in a frame that follows
 //! the patch: a piece of surface is flat, and in its own frame so is its box, which halves the leaves a query visits.
 
-use std::time::Duration;
-
 use glam::{DMat3, DVec3, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
 /// Children of a node and triangles of a leaf.
@@ -131,9 +128,9 @@ impl Node {
         let from_origin = [0, 1, 2].map(|k| query[k] - self.origin[k]);
         let local = self.axes.map(|a| a[0] * from_origin[0] + a[1] * from_origin[1] + a[2] * from_origin[2]);
         let mut squared = [0.0; WIDTH];
-        for lane in 0..WIDTH {
+        for (lane, squared) in squared.iter_mut().enumerate() {
             let [x, y, z] = [0, 1, 2].map(|k| outside(self.low[k][lane] - local[k], local[k] - self.high[k][lane]));
-            squared[lane] = x * x + y * y + z * z;
+            *squared = x * x + y * y + z * z;
         }
         squared
     }
@@ -184,8 +181,9 @@ fn sort_into_leaves(items: &mut [Item]) {
 /// Adds the nodes above the patches, which are the first `boxes.len()` nodes, and returns the root.
 fn add_inner_nodes(nodes: &mut Vec<Node>, boxes: &[Aabb]) -> u32 {
     let jittered: Vec<Aabb> = boxes.iter().enumerate().map(|(p, b)| jittered(p, b)).collect();
-    let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::fast_build() };
-    let binary = build_bvh2(&jittered, params, &mut Duration::default());
+    let all = (0..boxes.len() as u32).collect();
+    let builder = &mut PlocBuilder::with_capacity(boxes.len());
+    let binary = builder.build(PlocSearchDistance::Low, &jittered, all, SortPrecision::U64, 2);
     let patch_of = |n: usize| binary.primitive_indices[binary.nodes[n].first_index as usize];
     if binary.nodes[0].is_leaf() {
         return patch_of(0);

@@ -56,8 +56,8 @@ impl Nearest {
     fn visit(&mut self, bvh: &Bvh, leaf: u32, query: DVec3) {
         let stored = &bvh.leaves[leaf as usize];
         let mut squared = [0.0; WIDTH];
-        for lane in 0..WIDTH {
-            squared[lane] = closest_to_origin(stored.corners_from(query, lane)).1;
+        for (lane, squared) in squared.iter_mut().enumerate() {
+            *squared = closest_to_origin(stored.corners_from(query, lane)).1;
         }
         for lane in lanes(squared.map(|s| s <= self.squared)) {
             let triangle = stored.triangles[lane];
@@ -128,4 +128,23 @@ fn insert_descending(stack: &mut Vec<(f32, u32)>, bottom: usize, entry: (f32, u3
         place -= 1;
     }
     stack[place] = entry;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_machines_simd_does_not_change_a_bit() {
+        let wave = |i: u32| (i as f32 * 12.9898).sin();
+        let point = |i: u32| Vec3::new(wave(3 * i), wave(3 * i + 1), wave(3 * i + 2));
+        let triangles: Vec<u32> = (0..2000).collect();
+        let bvh = Bvh::new(&triangles, |t| [point(t), point(t) + 0.1 * point(t + 7), point(t) + 0.2 * point(t + 9)]);
+        let queries: Vec<_> = (0..500).map(|i| (1.5 * point(31 * i)).to_array()).collect();
+        let mut answers = [vec![SurfacePoint::default(); 500], vec![SurfacePoint::default(); 500]];
+        let [widest, scalar] = &mut answers;
+        pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries, answers: widest });
+        Batch { bvh: &bvh, queries: &queries, answers: scalar }.with_simd(pulp::Scalar::new());
+        assert_eq!(answers[0], answers[1]);
+    }
 }
