@@ -45,7 +45,9 @@ class SKINWRIGHT_PT_transfer(_Tab, Panel):
         """Problems first, as red rows."""
         layout = _settings_column(self.layout)
         if problem():
-            _alert(layout, problem())
+            row = layout.row()
+            row.alert = True
+            row.label(text="The native module cannot be used", icon="ERROR")  # the button's tooltip says why
         settings = context.scene.skinwright.transfer
         layout.prop(settings, "source")
         layout.prop(settings, "groups")
@@ -109,12 +111,6 @@ def _settings_column(layout: UILayout) -> UILayout:
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout.column()
-
-
-def _alert(layout: UILayout, sentence: str) -> None:
-    row = layout.row()
-    row.alert = True
-    row.label(text=sentence, icon="ERROR")
 
 
 CLASSES = (
