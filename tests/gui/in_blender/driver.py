@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import subprocess
 import sys
 import traceback
 from collections.abc import Callable, Generator
@@ -94,8 +96,9 @@ class Window:
         for area in self.window.screen.areas:
             area.tag_redraw()
         yield 0.4
-        with self.context():
-            bpy.ops.screen.screenshot(filepath=str(SHARE / "out" / f"{name}.png"))
+        # Blender's own screenshot operator reads black from a window on a virtual screen.
+        if shutil.which("import"):
+            subprocess.run(["import", "-window", "root", str(SHARE / "out" / f"{name}.png")], check=True)
 
 
 def start(steps: Callable[[Window], Steps]) -> None:
