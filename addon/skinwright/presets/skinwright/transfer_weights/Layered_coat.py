@@ -1,0 +1,13 @@
+import bpy
+
+settings = bpy.context.scene.skinwright.transfer
+
+settings.distance_mode = "RELATIVE"
+settings.relative_max_distance = 0.05
+settings.max_normal_angle = 0.523599
+settings.match_flipped_normals = False
+settings.smoothness_mode = "RELATIVE"
+settings.relative_smoothness_length = 0.05
+settings.island_policy = "BRIDGE"
+settings.smoothing_iterations = 2
+settings.smoothing_factor = 0.2

@@ -1,0 +1,5 @@
+"""The only code that touches Blender's data: numpy arrays out, numpy arrays in."""
+
+from . import armature, error, mask, mesh, vertex_groups
+
+__all__ = ["armature", "error", "mask", "mesh", "vertex_groups"]

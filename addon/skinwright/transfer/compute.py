@@ -1,0 +1,92 @@
+"""From arrays to the rows that will be written; nothing of Blender is touched."""
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import csr, native
+from ..csr import Rows
+from . import merging, scalar_fields
+from .inputs import Body, Garment
+from .params import TransferParams
+
+
+@dataclass(frozen=True)
+class Result:
+    """The new rows over `names`, for the vertices marked in `written`; `transfer` is the library's own answer."""
+
+    transfer: Any
+    names: list[str]
+    rows: Rows
+    written: NDArray[np.bool_]
+    seconds: float
+
+
+def compute(body: Body, garments: list[Garment], params: TransferParams) -> list[Result]:
+    """The new rows of every garment. Raises native.NativeError where there is no answer."""
+    bones = _source(body, body.bone_weights, len(body.bones)) if body.bones else None
+    fields = None
+    if body.fields:
+        packed = scalar_fields.pack(body.field_weights, len(body.fields))
+        fields = _source(body, packed, len(body.fields) + 1)
+    return [_compute_one(body, garment, bones, fields, params) for garment in garments]
+
+
+def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
+    geometry = body.geometry
+    return native.Source(body.object.name, geometry.positions, geometry.triangles, rows, n_columns)
+
+
+def _compute_one(
+    body: Body, garment: Garment, bones: native.Source | None, fields: native.Source | None, params: TransferParams
+) -> Result:
+    start = time.perf_counter()
+    names, rows = [], None
+    if bones:
+        transfer, rows = _bone_rows(bones, garment, params)
+        names = garment.names
+    if fields:
+        field_transfer, field_rows = _field_rows(fields, garment, params, len(body.fields))
+        transfer = transfer if bones else field_transfer
+        rows = csr.beside(rows, len(names), field_rows) if bones else field_rows
+        names = names + body.fields
+    wanted = np.array([name in body.chosen - garment.locks for name in names], bool)
+    # A vertex without a row is one the policy for islands leaves alone.
+    written = (np.diff(transfer.weights.indptr) > 0) & garment.writable
+    return Result(
+        transfer=transfer,
+        names=[name for name, kept in zip(names, wanted, strict=True) if kept],
+        rows=csr.take_columns(rows, wanted),
+        written=written,
+        seconds=time.perf_counter() - start,
+    )
+
+
+def _bone_rows(bones: native.Source, garment: Garment, params: TransferParams) -> tuple[Any, Rows]:
+    joined = params.mix_factor < 1 or bool(garment.locked.any())
+    # Where old weights join in, the limit comes after them.
+    limit = 0 if joined else params.max_influences
+    transfer, rows = _transfer(bones, garment, params, limit)
+    if joined:
+        rows = merging.merge(
+            rows,
+            garment.before,
+            locked=garment.locked,
+            factor=params.mix_factor,
+            max_influences=params.max_influences,
+        )
+    return transfer, rows
+
+
+def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> tuple[Any, Rows]:
+    transfer, rows = _transfer(fields, garment, params, max_influences=0)
+    return transfer, merging.mix(scalar_fields.unpack(rows, n), garment.fields_before, params.mix_factor)
+
+
+def _transfer(source: native.Source, garment: Garment, params: TransferParams, max_influences: int) -> tuple[Any, Rows]:
+    keywords = params.native() | {"mask": garment.mask, "max_influences": max_influences}
+    geometry = garment.geometry
+    return source.transfer(garment.object.name, geometry.positions, geometry.triangles, **keywords)

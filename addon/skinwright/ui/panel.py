@@ -1,0 +1,160 @@
+"""The Weights tab of the sidebar: a list of sub-panels, one a step."""
+
+import bpy
+from bl_ui.utils import PresetPanel
+from bpy.types import Context, Panel, UILayout
+
+from ..native import problem
+
+
+class _Tab:
+    """Where all of Skinwright's panels live."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Weights"
+
+
+class _TransferStep(_Tab):
+    """A sub-panel of settings under the button."""
+
+    bl_parent_id = "SKINWRIGHT_PT_transfer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.draw_settings(self.layout.column(), context)
+
+
+class SKINWRIGHT_PT_transfer_presets(PresetPanel, Panel):
+    """Ready-made settings by kind of garment."""
+
+    bl_label = "Garment Presets"
+    preset_subdir = "skinwright/transfer_weights"
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "skinwright.transfer_preset_add"
+
+
+class SKINWRIGHT_PT_transfer(_Tab, Panel):
+    """Source and button; all else has a default that does."""
+
+    bl_label = "Transfer Weights"
+    bl_order = 0
+
+    def draw_header_preset(self, _context: Context) -> None:
+        """The presets' button, on the right of the header."""
+        SKINWRIGHT_PT_transfer_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: Context) -> None:
+        """Problems first, as red rows."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        if problem():
+            _alert(layout, problem())
+        settings = context.scene.skinwright.transfer
+        layout.prop(settings, "source")
+        layout.prop(settings, "groups")
+        layout.operator("skinwright.transfer_weights", icon="MOD_VERTEX_WEIGHT")
+
+
+class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):
+    """Which vertices take over the weights of their closest point."""
+
+    bl_label = "Matching"
+
+    def draw_settings(self, layout: UILayout, context: Context) -> None:
+        """Shapes and thresholds."""
+        settings = context.scene.skinwright.transfer
+        layout.prop(settings, "geometry")
+        _length(layout, settings, "distance_mode", "relative_max_distance", "max_distance")
+        layout.prop(settings, "max_normal_angle")
+        layout.prop(settings, "match_flipped_normals")
+
+
+class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
+    """The active mesh's match mask."""
+
+    bl_label = "Match Mask"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        """Each mesh has its own mask."""
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw_settings(self, layout: UILayout, context: Context) -> None:
+        """The group and how it is read."""
+        settings = context.object.skinwright
+        layout.prop_search(settings, "mask_group", context.object, "vertex_groups", icon="GROUP_VERTEX")
+        column = layout.column()
+        column.active = bool(settings.mask_group)
+        column.prop(settings, "mask_reading")
+        if settings.mask_reading == "PAINTED":
+            column.prop(settings, "mask_threshold", slider=True)
+            column.prop(settings, "mask_invert")
+
+
+class SKINWRIGHT_PT_transfer_inpainting(_TransferStep, Panel):
+    """What happens where nothing matches."""
+
+    bl_label = "Inpainting"
+
+    def draw_settings(self, layout: UILayout, context: Context) -> None:
+        """The solve, loose parts, smoothing."""
+        settings = context.scene.skinwright.transfer
+        _length(layout, settings, "smoothness_mode", "relative_smoothness_length", "smoothness_length")
+        layout.prop(settings, "island_policy")
+        layout.prop(settings, "smoothing_iterations")
+        column = layout.column()
+        column.active = settings.smoothing_iterations > 0
+        column.prop(settings, "smoothing_factor", text="Factor")
+
+
+class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
+    """How the new weights join the old ones."""
+
+    bl_label = "Writing"
+
+    def draw_settings(self, layout: UILayout, context: Context) -> None:
+        """Limit, mix, and what else may change."""
+        settings = context.scene.skinwright.transfer
+        layout.prop(settings, "max_influences")
+        layout.prop(settings, "mix_factor")
+        layout.prop(settings, "selected_only")
+        layout.prop(settings, "add_armature")
+        layout.prop(settings, "make_single_user")
+
+
+def _length(layout: UILayout, settings: bpy.types.PropertyGroup, mode: str, relative: str, absolute: str) -> None:
+    row = layout.row(align=True)
+    row.prop(settings, relative if getattr(settings, mode) == "RELATIVE" else absolute)
+    row.prop(settings, mode, text="")
+
+
+def _alert(layout: UILayout, sentence: str) -> None:
+    row = layout.row()
+    row.alert = True
+    row.label(text=sentence, icon="ERROR")
+
+
+CLASSES = (
+    SKINWRIGHT_PT_transfer_presets,
+    SKINWRIGHT_PT_transfer,
+    SKINWRIGHT_PT_transfer_matching,
+    SKINWRIGHT_PT_transfer_mask,
+    SKINWRIGHT_PT_transfer_inpainting,
+    SKINWRIGHT_PT_transfer_writing,
+)
+
+
+def register() -> None:
+    """Register the panels, parents first."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Unregister them, children first."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
