@@ -77,12 +77,15 @@ def test_writing_does_not_reach_a_copy_that_shares_the_weights(deform_array, mes
     assert by_api(copy) == before
 
 
-@pytest.mark.parametrize("member", ["mesh_n_vertices", "layer_size"])
-def test_a_layout_that_does_not_fit_is_refused(deform_array, mesh, monkeypatch, member):
+def test_a_mesh_struct_that_does_not_fit_is_refused(deform_array, mesh, monkeypatch):
     true = deform_array.find_layout()
-    wrong = replace(true, **{member: getattr(true, member) + 4})
+    wrong = replace(true, mesh_n_vertices=true.mesh_n_vertices + 4)
     monkeypatch.setattr(deform_array, "find_layout", lambda: wrong)
-    # A layer found at the wrong place shows in the sampled counts; nothing beyond the mesh's own layers is read.
+    assert deform_array.open_array(mesh, np.arange(N)) is None
+
+
+def test_weights_that_are_elsewhere_are_refused(deform_array, mesh, monkeypatch):
+    monkeypatch.setattr(deform_array, "find_deform_layer", lambda _address, _layout: 0)
     assert deform_array.open_array(mesh, np.arange(N)) is None
 
 

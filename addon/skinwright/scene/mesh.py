@@ -63,12 +63,13 @@ def read(obj: bpy.types.Object, *, evaluated: bool = False) -> Geometry:
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     determinant = _checked_determinant(obj, matrix)
     local = _evaluated_positions(obj) if evaluated else _rest_positions(obj.data)
-    _check_finite(obj, local)
     triangles = _triangles(obj)
     if determinant < 0:
         triangles = triangles[:, ::-1]
-    positions = local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    return Geometry(np.ascontiguousarray(positions, np.float32), np.ascontiguousarray(triangles))
+    with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
+        positions = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    _check_finite(obj, positions)
+    return Geometry(positions, np.ascontiguousarray(triangles))
 
 
 def is_sheared(obj: bpy.types.Object) -> bool:

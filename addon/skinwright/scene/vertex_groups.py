@@ -30,7 +30,7 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     """
     n = len(obj.data.vertices)
     row, group, values = _memberships(obj.data, np.arange(n))
-    column = _lookup([obj.vertex_groups.find(name) for name in names], group)
+    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], group)
     keep = column >= 0
     vertex, column, values = row[keep], column[keep], values[keep]
     _check_finite(obj, names, vertex, column, values)
@@ -65,10 +65,15 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
 
 def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.VertexGroup]:
     """The groups of these names, created where missing. Raises SceneError where a cut name meets another."""
-    stored = [name.encode()[:_NAME_BYTES].decode(errors="ignore") for name in names]
+    stored = [_stored(name) for name in names]
     if len(set(stored)) != len(stored):
         raise SceneError(f"{obj.name} would get two groups of one name: shorten the names beyond {_NAME_BYTES} bytes")
     return [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+
+
+def _stored(name: str) -> str:
+    """The name as Blender stores it."""
+    return name.encode()[:_NAME_BYTES].decode(errors="ignore")
 
 
 def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
