@@ -4,7 +4,7 @@ Arrays: positions (V, 3) float32 in one common space (world units), triangles (T
 Angles are radians. An absolute length wins over its relative form when both are given. Every call frees the GIL.
 """
 
-from typing import Any, Literal, final
+from typing import Any, Literal, TypedDict, Unpack, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,28 +56,41 @@ class Transfer:
     @property
     def report(self) -> dict[str, Any]: ...
 
+class TransferSettings(TypedDict, total=False):
+    """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
+
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
+    `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
+    `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
+    """
+
+    max_distance: float | None
+    relative_max_distance: float
+    max_normal_angle: float
+    match_flipped_normals: bool
+    mask: ArrayLike | None
+    smoothness_length: float | None
+    relative_smoothness_length: float
+    smoothing_iterations: int
+    smoothing_factor: float
+    max_influences: int
+    island_policy: IslandPolicy
+
 @final
 class Source:
-    """A body prepared once (checks, BVH, normals) for any number of garments."""
+    """A body prepared once (checks, BVH, normals) for any number of garments. `threads` 0: all of the machine's."""
 
-    def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights) -> Source: ...
+    def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights, *, threads: int = 0) -> Source: ...
     def transfer(
         self,
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
         threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
 
 @final
@@ -95,45 +108,10 @@ class Inpainting:
     @property
     def islands(self) -> NDArray[np.uint32]: ...
     def set_source_weights(self, weights: Weights) -> None: ...
-    def matched(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-    ) -> NDArray[np.bool_]: ...
-    def solve(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
-    ) -> Transfer: ...
-    def start(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
-    ) -> Job: ...
+    def matched(self, **settings: Unpack[TransferSettings]) -> NDArray[np.bool_]: ...
+    def solve(self, **settings: Unpack[TransferSettings]) -> Transfer: ...
+    def start(self, **settings: Unpack[TransferSettings]) -> Job: ...
+    def raw_weights(self, **settings: Unpack[TransferSettings]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
 
 @final
 class Job:
@@ -155,7 +133,7 @@ def transfer_weights(
     *,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
-    max_normal_angle: float = ...,
+    max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
     smoothness_length: float | None = None,

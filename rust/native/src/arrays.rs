@@ -1,6 +1,6 @@
 //! NumPy arrays in (any array-like, cast and copied once) and out (moved, read-only).
 
-use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike1, PyArrayLike2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike1, PyArrayLike2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::InvalidParameter;

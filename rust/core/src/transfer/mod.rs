@@ -116,14 +116,14 @@ pub struct Transfer {
 /// Those of [`Inpainting::new`] and [`Inpainting::solve`].
 pub fn transfer_weights(
     source: &Source,
-    positions: &[[f32; 3]],
-    triangles: &[[u32; 3]],
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
     mask: Option<&[MaskValue]>,
     settings: &Settings,
 ) -> Result<(Inpainting, Transfer)> {
     settings.check()?;
     let progress = Progress::default();
-    let mut inpainting = Inpainting::new(source.clone(), positions.to_vec(), triangles.to_vec(), &progress)?;
+    let mut inpainting = Inpainting::new(source.clone(), positions, triangles, &progress)?;
     let transfer = inpainting.solve(mask, settings, &progress)?;
     Ok((inpainting, transfer))
 }
