@@ -34,18 +34,20 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        matched, inpainted, vertices, untouched = (
-            sum(getattr(garment, name) for garment in self.garments)
-            for name in ("matched", "inpainted", "vertices", "untouched")
-        )
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
+        counts.append(f"{self._sum('inpainted')} inpainted")
+        if self._sum("untouched"):
+            counts.append(f"{self._sum('untouched')} left as they were")
+        loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
+        if loose:
+            counts.append(f"{loose} loose parts")
         created = sum(len(garment.created_groups) for garment in self.garments)
-        groups = sum(garment.groups for garment in self.garments)
-        left = f", {untouched} left as they were" if untouched else ""
         seconds = sum(sum(garment.seconds.values()) for garment in self.garments)
-        return (
-            f"{self.source} to {names}: {matched} of {vertices} vertices matched, {inpainted} inpainted{left}; "
-            f"{groups} groups written, {created} of them new; {seconds:.2f} s"
-        )
+        groups = f"{self._sum('groups')} groups written, {created} of them new"
+        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s"
+
+    def _sum(self, name: str) -> int:
+        return sum(getattr(garment, name) for garment in self.garments)
 
     def all_warnings(self) -> list[str]:
         """Sentences worth a look, the body's first."""

@@ -34,4 +34,4 @@ def steps(
         garments = [read_garment(target, body, params) for target in targets]
         results = yield from compute(body, garments, params)
         reports = [write(body, garment, result, params) for garment, result in zip(garments, results, strict=True)]
-    return Report(source.name, reports, source_warnings(body))
+    return Report(source.name, reports, source_warnings(body, reports[0].native))

@@ -1,5 +1,7 @@
 """What is refused before anything is read or written, and what is worth a warning."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 
@@ -44,12 +46,19 @@ def _check_shared(objects: list[bpy.types.Object]) -> None:
             )
 
 
-def source_warnings(body: Body) -> list[str]:
-    """About the source, worth a look."""
+def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
+    """About the source, worth a look; the native report is that of any of its garments."""
+    found = []
     rigs = {modifier.object for modifier in armature.modifiers(body.object)}
     if len(rigs) > 1:
-        return [f"{body.object.name} has {len(rigs)} armatures; {body.armature.name} was taken"]
-    return []
+        found.append(f"{body.object.name} has {len(rigs)} armatures; {body.armature.name} was taken")
+    if body.bones and native_report["source_unnormalised"]:
+        count = native_report["source_unnormalised"]
+        found.append(f"{count} vertices of {body.object.name} have weights that do not sum to 1, and were normalised")
+    if body.bones and native_report["source_unweighted"]:
+        count = native_report["source_unweighted"]
+        found.append(f"{count} vertices of {body.object.name} have no weights, so nothing matches there")
+    return found
 
 
 def garment_warnings(body: Body, garment: Garment, params: TransferParams) -> list[str]:
