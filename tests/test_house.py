@@ -19,12 +19,19 @@ MAY_IMPORT = {
     "native": {"csr"},
     "reporting": {"csr"},
     "scene": {"csr", "scene"},
-    "transfer": {"csr", "native", "reporting", "scene", "transfer"},
+    "jobs": {"csr", "native"},
+    "transfer": {"csr", "jobs", "native", "reporting", "scene", "transfer"},
+    "match_session": {"csr", "jobs", "native", "scene", "transfer"},
+    "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
+    "preview": {"csr", "jobs", "match_session", "scene", "transfer"},
     "sculpt_session": {"csr", "native", "reporting", "scene"},
     "properties": {"transfer"},
     "preferences": {"native"},
     "operators": {
         "csr",
+        "jobs",
+        "mask_painting",
+        "match_session",
         "native",
         "operators",
         "preferences",
@@ -34,11 +41,12 @@ MAY_IMPORT = {
         "sculpt_session",
         "transfer",
     },
-    "ui": {"native", "properties", "ui"},
+    "ui": {"jobs", "match_session", "native", "preview", "properties", "ui"},
     "command_line": {"native", "reporting", "scene", "transfer"},
-    "__init__": {"command_line", "operators", "preferences", "properties", "ui"},
+    "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
 }
 MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}
+MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 

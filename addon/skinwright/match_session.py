@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from . import csr, native
 from .jobs import Jobs
 from .scene import mask, vertex_groups
-from .transfer import compute
 from .transfer.checks import check_objects
+from .transfer.compute import Result, bone_rows, bone_source, prepare, to_result
 from .transfer.inputs import read_body, read_garment, read_mask
 from .transfer.params import TransferParams
 
@@ -54,13 +54,13 @@ class MatchSession:
         self.source_name, self.target_name = source.name, target.name
         self.body = read_body(source, params)
         self.garment = read_garment(target, self.body, params)
-        self.inpainting = compute.prepare(compute.bone_source(self.body), self.garment, params)
+        self.inpainting = prepare(bone_source(self.body), self.garment, params)
         self.n_vertices = len(self.garment.geometry.positions)
         self.mask = np.full(self.n_vertices, mask.AUTOMATIC, np.uint8)
         self.mask_version = 0
         self.read_mask(target)
         self._key: tuple = ()
-        self._match: Match | None = None
+        self.last_match: Match | None = None
         self.written: csr.Rows | None = None
 
     def target(self) -> bpy.types.Object | None:
@@ -71,7 +71,8 @@ class MatchSession:
 
     def read_mask(self, target: bpy.types.Object) -> bool:
         """Read the mask anew; gives whether it has changed."""
-        now = read_mask(target)
+        group = target.skinwright.mask_group
+        now = read_mask(target) if group in target.vertex_groups else None
         if now is None:
             now = np.full(self.n_vertices, mask.AUTOMATIC, np.uint8)
         if np.array_equal(now, self.mask):
@@ -83,9 +84,9 @@ class MatchSession:
         """The categories under the thresholds in `params`; nothing is searched or solved."""
         thresholds = {name: getattr(params, name) for name in _THRESHOLDS}
         key = (*thresholds.values(), self.mask_version)
-        if key != self._key or self._match is None:
-            self._key, self._match = key, self._threshold(thresholds, params)
-        return self._match
+        if key != self._key or self.last_match is None:
+            self._key, self.last_match = key, self._threshold(thresholds, params)
+        return self.last_match
 
     def _threshold(self, thresholds: dict, params: TransferParams) -> Match:
         matched = self.inpainting.matched(**thresholds, mask=self.mask)
@@ -98,13 +99,25 @@ class MatchSession:
         max_distance = params.relative_max_distance * size if absolute is None else absolute
         return Match(category, max_distance, params.max_normal_angle)
 
-    def solve(self, params: TransferParams) -> Jobs[compute.Result]:
+    def matched(self, match: Match) -> NDArray[np.bool_]:
+        """(V,) whether a vertex takes the weights of its closest point."""
+        return np.isin(match.category, (Category.MATCHED, Category.FORCED_MATCH))
+
+    def chosen(self, what: str, match: Match, selected: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(V,) the vertices that `what` stands for: MATCHED, UNMATCHED, LOOSE parts, or the ISLAND of the selected."""
+        if what == "ISLAND":
+            return has_any(self.inpainting.islands, selected)
+        if what == "LOOSE":
+            return match.category == Category.UNMATCHED_ISLAND
+        return self.matched(match) == (what == "MATCHED")
+
+    def solve(self, params: TransferParams) -> Jobs[Result]:
         """The new rows under the mask as it was read last."""
         garment = replace(self.garment, mask=self.mask)
-        transfer, rows = yield from compute.bone_rows(self.inpainting, garment, params)
-        return compute.to_result(self.body, garment, transfer, garment.names, rows, 0.0)
+        transfer, rows = yield from bone_rows(self.inpainting, garment, params)
+        return to_result(self.body, garment, transfer, garment.names, rows, 0.0)
 
-    def write(self, target: bpy.types.Object, result: compute.Result) -> int:
+    def write(self, target: bpy.types.Object, result: Result) -> int:
         """Write the rows that differ from those written last; gives their number."""
         changed = result.written & differs(result.rows, self.written)
         vertices = np.flatnonzero(changed)
@@ -116,6 +129,11 @@ class MatchSession:
 
 # The match on show, if any.
 current: MatchSession | None = None
+
+
+def current_of(obj: bpy.types.Object | None) -> MatchSession | None:
+    """The match on show, if it is this object's."""
+    return current if obj and current and current.target() == obj else None
 
 
 def has_any(islands: NDArray[np.uint32], marked: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -58,7 +58,11 @@ class Blender:
             return self.collect(script, share, done)
 
     def environment(self, share: Path, display: str) -> dict[str, str]:
-        home = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/tmp", "LANG": "C.UTF-8"} if self.tree else dict(os.environ)
+        home = (
+            {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/tmp", "LANG": "C.UTF-8"}
+            if self.tree
+            else dict(os.environ)
+        )
         return home | {
             "DISPLAY": display,
             "LIBGL_ALWAYS_SOFTWARE": "1",
@@ -70,7 +74,9 @@ class Blender:
     def screen(self, size: tuple[int, int]) -> Iterator[str]:
         """A virtual screen of its own; it picks a free display number itself."""
         arguments = ["Xvfb", "-displayfd", "1", "-screen", "0", f"{size[0]}x{size[1]}x24", "-nolisten", "tcp", "-ac"]
-        server = subprocess.Popen(self.command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        server = subprocess.Popen(
+            self.command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
         try:
             number = server.stdout.readline().strip()
             if not number:

@@ -1,6 +1,7 @@
 """Vertex groups as CSR arrays, read and written exactly."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -15,6 +16,36 @@ _NAME_BYTES = 63
 
 # Row, group index and weight of each, in stored order.
 Memberships = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All groups of an object: `rows` over `names`, and the active one."""
+
+    names: list[str]
+    rows: Rows
+    active: str
+
+
+def snapshot(obj: bpy.types.Object) -> Snapshot:
+    """What `restore` needs to bring everything back; not in Edit mode."""
+    names = [group.name for group in obj.vertex_groups]
+    return Snapshot(names, read(obj, names), obj.vertex_groups.active.name if obj.vertex_groups.active else "")
+
+
+def restore(obj: bpy.types.Object, before: Snapshot) -> None:
+    """Bring back every membership bit for bit; groups made since then go."""
+    for group in list(obj.vertex_groups):
+        if group.name not in before.names:
+            obj.vertex_groups.remove(group)
+    write(obj, before.names, before.rows)
+    activate(obj, before.active)
+
+
+def activate(obj: bpy.types.Object, name: str) -> None:
+    """Make the group of this name the active one, if there is one."""
+    if name in obj.vertex_groups:
+        obj.vertex_groups.active = obj.vertex_groups[name]
 
 
 def locked(obj: bpy.types.Object) -> set[str]:
