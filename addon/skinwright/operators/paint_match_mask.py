@@ -40,6 +40,8 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
         cls = SKINWRIGHT_OT_paint_match_mask
         cls.painting, cls.asked_to_end = painting, ""
         match_session.current = painting.session
+        # Else undoing the first stroke would also undo that painting has begun.
+        bpy.ops.ed.undo_push(message=self.bl_label)
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         window_manager.modal_handler_add(self)
@@ -72,7 +74,8 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
         self.cancel(context)
         painting.finish(context) if keep else painting.cancel(context)
         self.report({"INFO"}, "Mask and weights kept" if keep else "All weights are as they were")
-        return {"FINISHED"} if keep else {"CANCELLED"}
+        # An undo step in both cases: the last one is a stroke, whose weights are no longer there.
+        return {"FINISHED"}
 
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits: then there is nothing to restore."""

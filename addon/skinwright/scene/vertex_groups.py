@@ -99,7 +99,12 @@ def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.Vertex
     stored = [_stored(name) for name in names]
     if len(set(stored)) != len(stored):
         raise SceneError(f"{obj.name} would get two groups of one name: shorten the names beyond {_NAME_BYTES} bytes")
-    return [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+    active = obj.vertex_groups.active
+    groups = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+    if active:
+        # A new group becomes the active one: not under a brush that is painting another.
+        activate(obj, active.name)
+    return groups
 
 
 def _stored(name: str) -> str:

@@ -28,7 +28,7 @@ def steps(window: Window) -> Steps:
         disable()
         assert left_behind() == before, (left_behind(), before)
     enable()
-    yield from window.show_tab("Skinwright")
+    yield from window.show_tab("Weights")
     yield from window.screenshot("panel")
     record["tab"] = window.region("UI").active_panel_category
 
