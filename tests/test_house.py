@@ -23,7 +23,7 @@ MAY_IMPORT = {
     "transfer": {"csr", "jobs", "native", "reporting", "scene", "transfer"},
     "match_session": {"csr", "jobs", "native", "scene", "transfer"},
     "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
-    "preview": {"csr", "jobs", "match_session", "scene", "transfer"},
+    "preview": {"csr", "match_session", "scene", "transfer"},
     "sculpt_session": {"csr", "native", "reporting", "scene"},
     "properties": {"transfer"},
     "preferences": {"native"},

@@ -34,6 +34,8 @@ class MaskPainting:
         if target.mode != "WEIGHT_PAINT":
             bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
         self.problem = ""
+        # When weights were written, and how long after the mask had been seen to have changed.
+        self.written_at: list[float] = []
         self.seconds: list[float] = []
         self._runner: jobs.Runner | None = None
         self._asked: tuple = ()
@@ -61,7 +63,8 @@ class MaskPainting:
         self._stop()
         self.problem, self._since = "", time.perf_counter()
         try:
-            self._runner = jobs.running = jobs.Runner(self.session.solve(params))
+            self._runner = jobs.Runner(self.session.solve(params))
+            self.session.solving = True
         except native.NativeError as error:
             self.problem = str(error)
 
@@ -78,14 +81,15 @@ class MaskPainting:
         result = self._runner.result
         self._stop()
         self.session.write(target, result)
-        self.seconds.append(time.perf_counter() - self._since)
+        self.written_at.append(time.perf_counter())
+        self.seconds.append(self.written_at[-1] - self._since)
         return True
 
     def _stop(self) -> None:
         if self._runner:
             if not self._runner.done:
                 self._runner.cancel()
-            self._runner = jobs.running = None
+            self._runner, self.session.solving = None, False
 
     def finish(self, context: bpy.types.Context) -> None:
         """Keep mask and weights; mode, active group and overlay become what they were."""

@@ -62,6 +62,8 @@ class MatchSession:
         self._key: tuple = ()
         self.last_match: Match | None = None
         self.written: csr.Rows | None = None
+        # While a job solves, asking for the match would wait for it.
+        self.solving = False
 
     def target(self) -> bpy.types.Object | None:
         """The target, while it is there with as many vertices as it had."""

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import jobs, match_session
+from . import match_session
 from .csr import Rows
 from .match_session import Category, Match, MatchSession
 from .scene import armature, changes, deformation, mesh, vertex_groups
@@ -86,13 +86,13 @@ _seen_version = -1
 
 
 def _match(obj: bpy.types.Object, params: TransferParams) -> Match:
-    """While a job holds the match, the one before it."""
+    """While a job solves, the match before it."""
     global _seen_version
     session = match_session.current
     if _seen_version != changes.version:
         session.read_mask(obj)
         _seen_version = changes.version
-    if jobs.running and session.last_match:
+    if session.solving and session.last_match:
         return session.last_match
     return session.match(params)
 

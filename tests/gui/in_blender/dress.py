@@ -1,11 +1,10 @@
-"""A figure with a spine of four bones and a dress that fits at the top, flares below, and has a loose buckle."""
+"""A figure with a spine of bones and a dress that fits at the top, flares below, and has a loose buckle."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-BONES = 4
 HEIGHT = 2.0
 
 
@@ -38,25 +37,25 @@ def from_arrays(name: str, positions: np.ndarray, quads: np.ndarray) -> bpy.type
     return obj
 
 
-def rig() -> bpy.types.Object:
+def rig(bones: int) -> bpy.types.Object:
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     parent = None
-    for bone in range(BONES):
+    for bone in range(bones):
         edit_bone = armature.data.edit_bones.new(f"Spine.{bone}")
-        edit_bone.head, edit_bone.tail = (0, 0, bone * HEIGHT / BONES), (0, 0, (bone + 1) * HEIGHT / BONES)
+        edit_bone.head, edit_bone.tail = (0, 0, bone * HEIGHT / bones), (0, 0, (bone + 1) * HEIGHT / bones)
         edit_bone.parent, parent = parent, edit_bone
     bpy.ops.object.mode_set(mode="OBJECT")
     return armature
 
 
-def body(armature: bpy.types.Object) -> bpy.types.Object:
+def body(armature: bpy.types.Object, bones: int) -> bpy.types.Object:
     obj = tube("Body", np.full(100, 0.3), 0.0, HEIGHT, 100)
     z = np.repeat(np.linspace(0, HEIGHT, 100), 100)
-    for bone in range(BONES):
-        weight = np.clip(1 - np.abs(z / HEIGHT * BONES - bone - 0.5), 0, 1)
+    for bone in range(bones):
+        weight = np.clip(1 - np.abs(z / HEIGHT * bones - bone - 0.5), 0, 1)
         group = obj.vertex_groups.new(name=f"Spine.{bone}")
         for value in np.unique(weight[weight > 0]):
             group.add(np.flatnonzero(weight == value).tolist(), float(value), "REPLACE")
@@ -83,12 +82,12 @@ def dress(vertices: int) -> bpy.types.Object:
     return obj
 
 
-def build(vertices: int = 2500) -> tuple[bpy.types.Object, bpy.types.Object, bpy.types.Object]:
+def build(vertices: int = 2500, bones: int = 4) -> tuple[bpy.types.Object, bpy.types.Object, bpy.types.Object]:
     """Replaces what is in the scene; gives armature, body and dress, the dress active."""
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
-    armature = rig()
-    figure = body(armature)
+    armature = rig(bones)
+    figure = body(armature, bones)
     garment = dress(vertices)
     garment.modifiers.new("Armature", "ARMATURE").object = armature
     return armature, figure, garment

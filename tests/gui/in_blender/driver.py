@@ -101,6 +101,14 @@ class Window:
             subprocess.run(["import", "-window", "root", str(SHARE / "out" / f"{name}.png")], check=True)
 
 
+def until(condition: Callable[[], object], seconds: float = 8.0) -> Steps:
+    for _ in range(int(seconds / 0.05)):
+        if condition():
+            return
+        yield 0.05
+    raise AssertionError(f"waited {seconds} s in vain")
+
+
 def start(steps: Callable[[Window], Steps]) -> None:
     """Runs the steps once the window stands; writes the record and ends Blender with 0, or with 3 on an exception."""
     bpy.context.preferences.view.show_splash = False

@@ -9,7 +9,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import bpy
 import dress
-from driver import EXTENSION, SHARE, Steps, Window, enable, record, start
+from driver import EXTENSION, Steps, Window, enable, record, start, until
+from painting import begin_painting, look, painting
 
 STROKE = [(-60 + 12 * i, 60 - 2 * i) for i in range(11)]
 
@@ -25,51 +26,6 @@ def without_mask(rows: list[dict[str, float]]) -> list[dict[str, float]]:
 def near(a: list[dict[str, float]], b: list[dict[str, float]]) -> bool:
     rows = zip(without_mask(a), without_mask(b), strict=True)
     return all(x.keys() == y.keys() and all(abs(x[name] - y[name]) < 1e-6 for name in x) for x, y in rows)
-
-
-def brush(window: Window) -> None:
-    """Debian's 4.3 comes without brushes."""
-    with window.context():
-        if bpy.context.tool_settings.weight_paint.brush is None:
-            bpy.data.brushes.new("Paint", mode="WEIGHT_PAINT").asset_mark()
-            bpy.ops.brush.asset_activate(asset_library_type="LOCAL", relative_asset_identifier="Brush/Paint")
-        settings = bpy.context.tool_settings
-        unified = getattr(settings.weight_paint, "unified_paint_settings", None) or settings.unified_paint_settings
-        unified.use_unified_weight = unified.use_unified_size = unified.use_unified_strength = True
-        unified.weight, unified.size, unified.strength = 0.0, 40, 1.0
-        settings.weight_paint.brush.weight = 0.0
-
-
-def painting():
-    return import_module(f"{EXTENSION}.operators.paint_match_mask").SKINWRIGHT_OT_paint_match_mask.painting
-
-
-def until(condition, seconds: float = 8.0) -> Steps:
-    for _ in range(int(seconds / 0.05)):
-        if condition():
-            return
-        yield 0.05
-    raise AssertionError(f"waited {seconds} s in vain")
-
-
-def look(window: Window) -> None:
-    with window.context():
-        bpy.ops.view3d.view_axis(type="FRONT")
-        bpy.ops.view3d.view_selected()
-        bpy.context.region_data.view_distance *= 1.15
-    view = window.area.spaces.active
-    view.shading.type = "SOLID"
-    view.overlay.show_floor = view.overlay.show_axis_x = view.overlay.show_axis_y = False
-    view.show_region_toolbar = False
-
-
-def begin_painting(window: Window) -> Steps:
-    with window.context():
-        bpy.ops.skinwright.paint_match_mask("INVOKE_DEFAULT")
-    yield 0.3
-    brush(window)
-    yield from until(lambda: painting().seconds)
-    yield 0.4
 
 
 def steps(window: Window) -> Steps:
@@ -143,7 +99,6 @@ def steps(window: Window) -> Steps:
     yield from window.screenshot("influences")
     bpy.context.scene.skinwright.overlay.kind = "NONE"
     yield from window.screenshot("posed")
-    assert (SHARE / "out").exists()
 
 
 start(steps)
