@@ -41,6 +41,12 @@ class Runner:
             self._answer()
         return self.done
 
+    def wait(self, seconds: float) -> None:
+        """Give the present job this long to end."""
+        end = time.perf_counter() + seconds
+        while self._job and not self._job.done and time.perf_counter() < end:
+            time.sleep(0.001)
+
     def cancel(self) -> None:
         """Stop without the steps that are left."""
         if self._job:

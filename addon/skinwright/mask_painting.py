@@ -15,6 +15,10 @@ from .scene.error import SceneError
 from .transfer.params import TransferParams
 
 
+# A solve this short is waited for: the view would be drawn in between, which takes about as long.
+PATIENCE_SECONDS = 0.4
+
+
 class MaskPainting:
     """The weights as they were, and the solve that follows the mask."""
 
@@ -57,6 +61,8 @@ class MaskPainting:
         if live and asked != self._asked:
             self._asked = asked
             self._start(params)
+            if self._runner:
+                self._runner.wait(PATIENCE_SECONDS)
         return self._take_in(target)
 
     def _start(self, params: TransferParams) -> None:

@@ -2,13 +2,14 @@
 
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import bpy
 import dress
-from driver import Steps, Window, enable, record, start, until
+from driver import EXTENSION, Steps, Window, enable, record, start, until
 from painting import begin_painting, look, painting
 
 STROKES = 7
@@ -37,9 +38,23 @@ def steps(window: Window) -> Steps:
             figures["solve and write"].append(painting().seconds[-1])
             figures["written"].append(written - released[0])
             figures["drawn"].append(next(at for at in drawn if at > written) - released[0])
+        figures["overlay"] = overlay_seconds(window)
         record[str(len(garment.data.vertices))] = figures
         window.key("ESC")
         yield from until(lambda: painting() is None)
+
+
+def overlay_seconds(window: Window) -> list[float]:
+    """What the overlay adds to a drawing when something has changed: values, shape, upload."""
+    overlay, preview = (import_module(f"{EXTENSION}.{name}") for name in ("ui.overlay", "preview"))
+    seconds = []
+    for _ in range(STROKES):
+        preview._kept = None
+        begin = time.perf_counter()
+        with window.context():
+            overlay._batch(overlay._picture(), 1.0)
+        seconds.append(time.perf_counter() - begin)
+    return seconds
 
 
 released = [0.0]
