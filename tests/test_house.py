@@ -24,6 +24,7 @@ MAY_IMPORT = {
     "match_session": {"csr", "jobs", "native", "scene", "transfer"},
     "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
     "preview": {"csr", "match_session", "scene", "transfer"},
+    "weight_check": {"csr", "scene"},
     "sculpt_session": {"csr", "native", "reporting", "scene"},
     "properties": {"transfer"},
     "preferences": {"native"},
@@ -40,13 +41,14 @@ MAY_IMPORT = {
         "scene",
         "sculpt_session",
         "transfer",
+        "weight_check",
     },
     "ui": {"jobs", "match_session", "native", "preview", "properties", "ui"},
     "command_line": {"native", "reporting", "scene", "transfer"},
     "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
 }
 MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}
-MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview"}
+MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview", "weight_check"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 

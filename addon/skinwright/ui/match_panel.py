@@ -84,7 +84,19 @@ class SKINWRIGHT_PT_overlay(Tab, Panel):
         layout.prop(overlay, "opacity", slider=True)
 
 
-CLASSES = (SKINWRIGHT_PT_match, SKINWRIGHT_PT_match_edit, SKINWRIGHT_PT_overlay)
+class SKINWRIGHT_PT_check(Tab, Panel):
+    """What is wrong with weights."""
+
+    bl_label = "Check"
+    bl_order = 9
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context: Context) -> None:
+        """Its settings are in the redo panel."""
+        self.layout.operator("skinwright.check_weights", icon="CHECKMARK")
+
+
+CLASSES = (SKINWRIGHT_PT_match, SKINWRIGHT_PT_match_edit, SKINWRIGHT_PT_overlay, SKINWRIGHT_PT_check)
 
 
 def register() -> None:
