@@ -22,7 +22,9 @@ def main(sizes: list[str]) -> None:
     for blender in blenders:
         record = blender.run("latency", *sizes, timeout=400, size=(800, 600))
         print(f"\nBlender {record.pop('version')}\n")
-        print("| vertices | first solve | solve and write | weights written after release | drawn after release | overlay made |")
+        print(
+            "| vertices | first solve | solve and write | weights written after release | drawn after release | overlay made |"
+        )
         print("|---|---|---|---|---|---|")
         for vertices, figures in record.items():
             cells = [f"{figures['first solve'] * 1e3:.0f}"]

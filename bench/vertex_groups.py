@@ -14,12 +14,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "addon"))
 
+import bmesh  # there only once bpy is loaded
 import bpy
 import numpy as np
 from skinwright.csr import Rows
 from skinwright.scene import deform_array, vertex_groups
-
-import bmesh  # there only once bpy is loaded
 
 GROUPS, INFLUENCES, ROUNDS, CHANGED = 60, 4, 5, 2000
 NAMES = [f"Bone.{bone:03d}" for bone in range(GROUPS)]

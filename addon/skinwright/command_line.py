@@ -1,4 +1,4 @@
-"""The transfer without a window: `blender -c skinwright transfer ...`, and what blender_scripts/transfer_weights.py runs.
+"""The transfer without a window: `blender -c skinwright transfer ...`, and blender_scripts/transfer_weights.py.
 
 Exit codes: 0 done, 1 failed (the sentence is on stderr), 2 wrong usage.
 """

@@ -14,7 +14,6 @@ from .scene import changes, mask, vertex_groups
 from .scene.error import SceneError
 from .transfer.params import TransferParams
 
-
 # A solve this short is waited for: the view would be drawn in between, which takes about as long.
 PATIENCE_SECONDS = 0.4
 

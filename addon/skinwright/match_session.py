@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import csr, native
+from . import csr
 from .jobs import Jobs
 from .scene import mask, vertex_groups
 from .transfer.checks import check_objects

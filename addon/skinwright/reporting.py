@@ -6,7 +6,7 @@ from typing import Any
 
 @dataclass
 class GarmentReport:
-    """One target. Counts are of vertices unless they say otherwise; `seconds` by step; `native` as the library gave it."""
+    """One target. `matched`, `inpainted` and `untouched` count vertices; `native` is what the library says."""
 
     target: str
     vertices: int

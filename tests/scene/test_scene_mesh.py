@@ -100,6 +100,27 @@ def test_evaluated_keeps_the_original_vertices(mesh, kind):
     assert modifier.show_viewport and not off.show_viewport
 
 
+@pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
+def test_what_is_not_evaluated_has_no_current_shape(mesh, scene_error, hidden):
+    obj = builders.grid("Garment", 3)
+    if hidden == "hide_viewport":
+        obj.hide_viewport = True
+    else:
+        bpy.context.collection.objects.unlink(obj)
+    bpy.context.view_layer.update()
+    with pytest.raises(scene_error, match="Garment is disabled or excluded"):
+        mesh.read(obj, evaluated=True)
+    assert len(mesh.read(obj).positions) == 9
+
+
+def test_hidden_by_the_eye_still_has_a_current_shape(mesh):
+    obj = builders.grid("Garment", 3)
+    modifier = obj.modifiers.new("Displace", "DISPLACE")
+    modifier.strength, modifier.mid_level = 1, 0
+    obj.hide_set(True)
+    assert mesh.read(obj, evaluated=True).positions[:, 2] == pytest.approx(1)
+
+
 def test_scale_of_zero_is_refused(mesh, scene_error):
     obj = builders.grid("Garment", 3)
     obj.scale.y = 0

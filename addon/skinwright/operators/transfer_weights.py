@@ -49,6 +49,18 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferOptions, Operator):
             return self.execute(context)
         return self.begin(context, steps(*self._inputs(context)))
 
+    def draw(self, _context: Context) -> None:
+        """The redo panel."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "groups")
+        for draw in (self.draw_matching, self.draw_inpainting, self.draw_writing):
+            layout.separator()
+            draw(layout.column())
+        layout.separator()
+        layout.prop(self, "freeze")
+
     def execute(self, context: Context) -> set[str]:
         """Transfer, and say in a line what was done or why not."""
         if self.freeze:
@@ -63,9 +75,9 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferOptions, Operator):
 
     def complete(self, _context: Context, report: Report) -> set[str]:
         """Say what was done."""
-        for warning in report.all_warnings():
-            self.report({"WARNING"}, warning)
         self.report({"INFO"}, report.sentence())
+        for warning in report.all_warnings():  # last, as the status bar shows the last
+            self.report({"WARNING"}, warning)
         return {"FINISHED"}
 
     def _inputs(self, context: Context) -> tuple[Context, Object, list[Object], TransferParams]:

@@ -1,6 +1,6 @@
 """Meshes as arrays in world space, at rest or as the modifiers that only deform leave them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -168,22 +168,23 @@ def _vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np
 
 
 def _evaluated_positions(obj: bpy.types.Object) -> NDArray[np.float32]:
-    with _topology_kept([obj]):
-        mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        now = positions(mesh)
+    with _topology_kept(obj):
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        now = positions(evaluated.data)
+    if not evaluated.is_evaluated:
+        raise SceneError(f"{obj.name} is disabled or excluded, so it has no current shape: show it or use rest shapes")
     if len(now) != len(obj.data.vertices):
-        raise SceneError(f"{obj.name} has another number of vertices when evaluated: use the rest shape instead")
+        raise SceneError(f"{obj.name} has another number of vertices when evaluated: use rest shapes")
     return now
 
 
 @contextmanager
-def _topology_kept(objects: Iterable[bpy.types.Object]) -> Iterator[None]:
+def _topology_kept(obj: bpy.types.Object) -> Iterator[None]:
     """Switch off, for the moment, the modifiers after which a vertex is no longer the vertex that carries weights."""
-    hidden = [m for obj in objects for m in obj.modifiers if m.show_viewport and m.type not in _KEEPS_TOPOLOGY]
+    hidden = [m for m in obj.modifiers if m.show_viewport and m.type not in _KEEPS_TOPOLOGY]
     try:
         for modifier in hidden:
             modifier.show_viewport = False
-        bpy.context.view_layer.update()
         yield
     finally:
         for modifier in hidden:

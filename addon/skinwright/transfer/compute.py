@@ -62,15 +62,15 @@ def _compute_one(
     body: Body, garment: Garment, bones: native.Source | None, fields: native.Source | None, params: TransferParams
 ) -> Jobs[Result]:
     start = time.perf_counter()
-    names, rows = [], None
-    if bones:
-        transfer, rows = yield from bone_rows(prepare(bones, garment, params), garment, params)
-        names = garment.names
+    names: list[str] = []
+    rows = csr.empty(len(garment.writable))
     if fields:
-        field_transfer, field_rows = yield from _field_rows(fields, garment, params, len(body.fields))
-        transfer = transfer if bones else field_transfer
-        rows = csr.beside(rows, len(names), field_rows) if bones else field_rows
-        names = names + body.fields
+        transfer, rows = yield from _field_rows(fields, garment, params, len(body.fields))
+        names = body.fields
+    if bones:
+        transfer, rows_of_bones = yield from bone_rows(prepare(bones, garment, params), garment, params)
+        rows = csr.beside(rows, len(names), rows_of_bones)
+        names = names + garment.names
     return to_result(body, garment, transfer, names, rows, time.perf_counter() - start)
 
 
@@ -89,6 +89,7 @@ def bone_rows(inpainting: native.Inpainting, garment: Garment, params: TransferP
     # Where old weights join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
     transfer, rows = yield _start(inpainting, garment, params, limit)
+    _check(garment, rows, limit)
     if joined:
         rows = merging.merge(
             rows,
@@ -98,6 +99,15 @@ def bone_rows(inpainting: native.Inpainting, garment: Garment, params: TransferP
             max_influences=params.max_influences,
         )
     return transfer, rows
+
+
+def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
+    """A last look at what the library answers: nothing that is not a set of weights is ever written."""
+    counts = np.diff(rows.indptr)
+    sums = csr.row_sums(rows)[counts > 0]
+    sound = np.isfinite(rows.values).all() and (rows.values >= 0).all() and (np.abs(sums - 1) < 1e-5).all()
+    if not sound or (max_influences and counts.max(initial=0) > max_influences):
+        raise native.NativeError(f"{garment.object.name}: the answer is no set of weights; please report this")
 
 
 def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> Jobs[tuple[Any, Rows]]:

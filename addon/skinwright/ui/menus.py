@@ -1,6 +1,6 @@
 """Entries in Blender's own menus."""
 
-from bpy.types import VIEW3D_MT_make_links, VIEW3D_MT_paint_weight, Context, Menu
+from bpy.types import Context, Menu, VIEW3D_MT_make_links, VIEW3D_MT_paint_weight
 
 
 def _transfer_weights(menu: Menu, _context: Context) -> None:

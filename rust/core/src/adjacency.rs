@@ -80,7 +80,8 @@ fn duplicated_triangles(triangles: &[[u32; 3]], around: &VertexTriangles, vertex
         seen.sort_unstable();
         seen.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect::<Vec<_>>()
     };
-    let mut duplicates: Vec<u32> = (0..vertex_count).into_par_iter().map_init(Vec::new, at_vertex).flatten_iter().collect();
+    let mut duplicates: Vec<u32> =
+        (0..vertex_count).into_par_iter().map_init(Vec::new, at_vertex).flatten_iter().collect();
     duplicates.sort_unstable();
     duplicates
 }

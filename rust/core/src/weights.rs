@@ -91,9 +91,10 @@ impl Weights {
     /// # Errors
     /// [`Error::WeightNegative`] with the first negative entry.
     pub fn check_not_negative(&self) -> Result<()> {
-        self.values.iter().position(|&x| x < 0.0).map_or(Ok(()), |at| {
-            Err(Error::WeightNegative { vertex: self.vertex_of_entry(at), bone: self.bones[at] })
-        })
+        self.values
+            .iter()
+            .position(|&x| x < 0.0)
+            .map_or(Ok(()), |at| Err(Error::WeightNegative { vertex: self.vertex_of_entry(at), bone: self.bones[at] }))
     }
 
     fn vertex_of_entry(&self, at: usize) -> usize {

@@ -14,7 +14,10 @@ pub type Matrix<'py, T> = PyArrayLike2<'py, T, AllowTypeChange>;
 pub fn triples<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
     if array.shape()[1] != 3 {
         let shape = array.shape();
-        return Err(InvalidParameter::new_err(format!("{name} must have shape (N, 3), not ({}, {})", shape[0], shape[1])));
+        return Err(InvalidParameter::new_err(format!(
+            "{name} must have shape (N, 3), not ({}, {})",
+            shape[0], shape[1]
+        )));
     }
     Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }

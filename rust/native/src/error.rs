@@ -11,7 +11,12 @@ create_exception!(skinwright_native, SkinwrightError, PyValueError, "Base of eve
 create_exception!(skinwright_native, NothingMatched, SkinwrightError, "No target vertex matches the source.");
 create_exception!(skinwright_native, InvalidMesh, SkinwrightError, "A mesh that cannot be used.");
 create_exception!(skinwright_native, InvalidWeights, SkinwrightError, "Weights that cannot be used.");
-create_exception!(skinwright_native, InvalidParameter, SkinwrightError, "A parameter out of range or of the wrong shape.");
+create_exception!(
+    skinwright_native,
+    InvalidParameter,
+    SkinwrightError,
+    "A parameter out of range or of the wrong shape."
+);
 create_exception!(skinwright_native, NotSolvable, SkinwrightError, "A system without a reliable solution.");
 create_exception!(skinwright_native, Cancelled, SkinwrightError, "The work was cancelled; nothing was changed.");
 

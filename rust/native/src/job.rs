@@ -56,7 +56,8 @@ impl Job {
     /// Whether `result()` returns at once.
     #[getter]
     fn done(&self) -> bool {
-        self.result.get().is_some() || self.thread.lock().expect("never poisoned").as_ref().is_some_and(JoinHandle::is_finished)
+        self.result.get().is_some()
+            || self.thread.lock().expect("never poisoned").as_ref().is_some_and(JoinHandle::is_finished)
     }
 
     /// Asks the work to stop; `result()` then raises `Cancelled` unless it had finished already.

@@ -290,7 +290,8 @@ impl Inpainting {
     #[pyo3(signature = (**settings))]
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
-        let solve = |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
+        let solve =
+            |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
         let transfer = self.enter(py, solve)?;
         self.closest.present(py, transfer)
     }

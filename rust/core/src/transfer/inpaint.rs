@@ -122,7 +122,8 @@ impl Block {
     /// # Errors
     /// [`Error::NotPositiveDefinite`] if the residual stays above 1e-8 after refinement.
     pub fn solve(&self, source: &Source, points: &[SurfacePoint]) -> Result<BlockWeights> {
-        let rows: Vec<Vec<(u32, f64)>> = self.boundary.vertices.par_iter().map(|&i| blended(source, &points[i as usize])).collect();
+        let rows: Vec<Vec<(u32, f64)>> =
+            self.boundary.vertices.par_iter().map(|&i| blended(source, &points[i as usize])).collect();
         let mut bones: Vec<u32> = rows.iter().flatten().map(|&(bone, _)| bone).collect();
         bones.sort_unstable();
         bones.dedup();
@@ -162,7 +163,8 @@ impl Block {
     }
 
     fn residual(&self, x: &[f64], b: &[f64], columns: usize) -> f64 {
-        let signs: Vec<f64> = (0..columns as u32).map(|k| if (k * 0x9E37 + 0x79B9) & 0x40 == 0 { 1.0 } else { -0.6 }).collect();
+        let signs: Vec<f64> =
+            (0..columns as u32).map(|k| if (k * 0x9E37 + 0x79B9) & 0x40 == 0 { 1.0 } else { -0.6 }).collect();
         let combine = |rows: &[f64]| -> Vec<f64> {
             let dot = |row: &[f64]| std::iter::zip(row, &signs).map(|(a, b)| a * b).sum();
             rows.par_chunks(columns).with_min_len(256).map(dot).collect()
@@ -176,7 +178,13 @@ impl Block {
         });
         let norm = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let scale = norm(&absolute_row_sums) * norm(&x) + norm(&b);
-        if r.iter().any(|x| x.is_nan()) { f64::NAN } else if scale == 0.0 { 0.0 } else { norm(&r) / scale }
+        if r.iter().any(|x| x.is_nan()) {
+            f64::NAN
+        } else if scale == 0.0 {
+            0.0
+        } else {
+            norm(&r) / scale
+        }
     }
 
     /// One step of iterative refinement.

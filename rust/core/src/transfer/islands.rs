@@ -70,7 +70,8 @@ impl Scene<'_> {
             }
         }
         if policy != IslandPolicy::Skip {
-            let pending: Vec<usize> = (0..members.len()).filter(|&k| !members[k].is_empty() && rows[k].is_none()).collect();
+            let pending: Vec<usize> =
+                (0..members.len()).filter(|&k| !members[k].is_empty() && rows[k].is_none()).collect();
             for &k in &pending {
                 policies[k] = IslandPolicy::Bridge;
             }
@@ -98,8 +99,10 @@ impl Scene<'_> {
             out.extend(row.iter().map(|&(bone, value)| (bone, value as f32)));
         });
         let unmatched = std::iter::zip(&members, policies).filter(|(island, _)| !island.is_empty());
-        let report = |(island, policy): (&Vec<u32>, IslandPolicy)| {
-            UnmatchedIsland { first_vertex: island[0], vertices: island.len(), policy }
+        let report = |(island, policy): (&Vec<u32>, IslandPolicy)| UnmatchedIsland {
+            first_vertex: island[0],
+            vertices: island.len(),
+            policy,
         };
         (filled, unmatched.map(report).collect())
     }

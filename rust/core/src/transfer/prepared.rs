@@ -77,7 +77,17 @@ impl Inpainting {
         progress.report(0.4);
         let triangles = if clean.len() == triangles.len() { triangles } else { clean.into_owned() };
         let preparation = stages.into_seconds();
-        Ok(Self { source, diagonal, islands, laplacian, closest, positions, triangles, blocks: Vec::new(), preparation })
+        Ok(Self {
+            source,
+            diagonal,
+            islands,
+            laplacian,
+            closest,
+            positions,
+            triangles,
+            blocks: Vec::new(),
+            preparation,
+        })
     }
 
     /// Closest source point of each vertex (V).
@@ -120,12 +130,7 @@ impl Inpainting {
     /// # Errors
     /// [`Error::NothingMatched`], [`Error::NotPositiveDefinite`], [`Error::InvalidParameter`],
     /// [`Error::LengthMismatch`], [`Error::Cancelled`]. A failed solve leaves the kept blocks usable.
-    pub fn solve(
-        &mut self,
-        mask: Option<&[MaskValue]>,
-        settings: &Settings,
-        progress: &Progress,
-    ) -> Result<Transfer> {
+    pub fn solve(&mut self, mask: Option<&[MaskValue]>, settings: &Settings, progress: &Progress) -> Result<Transfer> {
         let mut stages = Stages::start();
         let problem = self.pose(mask, settings)?;
         let factored_blocks = self.factor(&problem, progress)?;
@@ -137,7 +142,8 @@ impl Inpainting {
         stages.end("smooth");
         progress.check()?;
         let (weights, unmatched_islands) = self.scene(&problem).fill(weights, settings.island_policy);
-        let weights = if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
+        let weights =
+            if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
         stages.end("islands and limit");
         let (source_unweighted, source_unnormalised) = self.source.unweighted_and_unnormalised();
         let report = Report {
@@ -234,7 +240,8 @@ impl Inpainting {
             let at = wanted.binary_search_by_key(&block.unknowns()[0], |unknowns| unknowns[0]);
             at.is_ok_and(|at| block.serves(&wanted[at], l))
         });
-        let missing = |unknowns: &Vec<u32>| kept.binary_search_by_key(&unknowns[0], |block| block.unknowns()[0]).is_err();
+        let missing =
+            |unknowns: &Vec<u32>| kept.binary_search_by_key(&unknowns[0], |block| block.unknowns()[0]).is_err();
         let missing: Vec<Vec<u32>> = wanted.into_iter().filter(missing).collect();
         let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
         let total = missing.len();

@@ -38,19 +38,24 @@ pub fn region(mesh: &TriMesh<'_>, laplacian: &Laplacian, unmatched: &[bool], rea
 /// Rows that are empty stay empty and count for nothing.
 pub fn smooth(weights: Weights, laplacian: &Laplacian, region: &[bool], iterations: u32, factor: f64) -> Weights {
     (0..iterations).fold(weights, |weights, _| {
-        Weights::from_rows(region.len(), weights.n_bones(), || Accumulator::new(weights.n_bones()), |sum, i, out| {
-            let own = weights.row(i);
-            if !region[i] || own.0.is_empty() || laplacian.neighbours(i).is_empty() {
-                out.extend(std::iter::zip(own.0, own.1).map(|(&bone, &value)| (bone, value)));
-                return;
-            }
-            let neighbours = laplacian.neighbours(i);
-            sum.add(own, 1.0 - factor);
-            for &j in neighbours {
-                sum.add(weights.row(j as usize), factor / neighbours.len() as f64);
-            }
-            sum.drain_normalised(out);
-        })
+        Weights::from_rows(
+            region.len(),
+            weights.n_bones(),
+            || Accumulator::new(weights.n_bones()),
+            |sum, i, out| {
+                let own = weights.row(i);
+                if !region[i] || own.0.is_empty() || laplacian.neighbours(i).is_empty() {
+                    out.extend(std::iter::zip(own.0, own.1).map(|(&bone, &value)| (bone, value)));
+                    return;
+                }
+                let neighbours = laplacian.neighbours(i);
+                sum.add(own, 1.0 - factor);
+                for &j in neighbours {
+                    sum.add(weights.row(j as usize), factor / neighbours.len() as f64);
+                }
+                sum.drain_normalised(out);
+            },
+        )
     })
 }
 
