@@ -12,6 +12,7 @@ mod prepared;
 mod report;
 pub mod smooth;
 mod source;
+pub mod system;
 
 pub use islands::{IslandPolicy, UnmatchedIsland};
 pub use matching::{Criteria, MaskValue};

@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::inpaint::{Block, BlockWeights, independent_blocks, number_unknowns};
+use super::inpaint::{Block, BlockWeights};
 use super::islands::Scene;
 use super::matching::Closest;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
+use super::system::{independent_blocks, number_unknowns};
 use super::{Criteria, Length, MaskValue, Settings, Source, Transfer, limit, smooth};
 use crate::adjacency::{Islands, NONE, clean_triangles};
 use crate::error::{Error, Result};
