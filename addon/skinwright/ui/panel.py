@@ -4,10 +4,11 @@ import bpy
 from bl_ui.utils import PresetPanel
 from bpy.types import Context, Panel, UILayout
 
+from .. import jobs
 from ..native import problem
 
 
-class _Tab:
+class Tab:
     """Where all of Skinwright's panels live."""
 
     bl_space_type = "VIEW_3D"
@@ -15,7 +16,7 @@ class _Tab:
     bl_category = "Weights"
 
 
-class _TransferStep(_Tab):
+class _TransferStep(Tab):
     """A sub-panel of settings under the button."""
 
     bl_parent_id = "SKINWRIGHT_PT_transfer"
@@ -31,7 +32,7 @@ class SKINWRIGHT_PT_transfer_presets(PresetPanel, Panel):
     preset_add_operator = "skinwright.transfer_preset_add"
 
 
-class SKINWRIGHT_PT_transfer(_Tab, Panel):
+class SKINWRIGHT_PT_transfer(Tab, Panel):
     """Source and button; all else has a default that does."""
 
     bl_label = "Transfer Weights"
@@ -51,6 +52,8 @@ class SKINWRIGHT_PT_transfer(_Tab, Panel):
         settings = context.scene.skinwright.transfer
         layout.prop(settings, "source")
         layout.prop(settings, "groups")
+        if jobs.running:
+            layout.progress(factor=jobs.running.progress, text=f"{jobs.running.progress:.0%}, Esc stops")
         layout.operator("skinwright.transfer_weights", icon="MOD_VERTEX_WEIGHT")
 
 
@@ -67,7 +70,7 @@ class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):
 class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
     """The active mesh's match mask."""
 
-    bl_label = "Match Mask"
+    bl_label = "Mask"
 
     @classmethod
     def poll(cls, context: Context) -> bool:
