@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from .csr import Rows
 
+_module: Any = None
+_import_error = ""
 try:
-    import skinwright_native as _module
+    import skinwright_native
+
+    _module = skinwright_native
 except ImportError as error:
-    _module, _import_error = None, str(error)
-else:
-    _import_error = ""
+    _import_error = str(error)
 
 
 class NativeError(ValueError):

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import csr
 from ..csr import Rows
 from .error import SceneError
 
@@ -24,8 +25,11 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     `bones` index into `names` and ascend in each row; a name the object lacks has no entries.
     Raises SceneError for a weight that is not a number.
     """
+    indices = [obj.vertex_groups.find(_stored(name)) for name in names]
+    if all(index < 0 for index in indices):
+        return csr.empty(len(obj.data.vertices))
     counts, groups, values = _memberships(obj.data.vertices)
-    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], groups)
+    column = _lookup(indices, groups)
     keep = column >= 0
     vertex = np.repeat(np.arange(len(counts)), counts)[keep]
     column, values = column[keep], values[keep]

@@ -44,15 +44,15 @@ def _compute_one(
     body: Body, garment: Garment, bones: native.Source | None, fields: native.Source | None, params: TransferParams
 ) -> Result:
     start = time.perf_counter()
-    names, rows = [], None
-    if bones:
-        transfer, rows = _bone_rows(bones, garment, params)
-        names = garment.names
+    names: list[str] = []
+    rows = csr.empty(len(garment.writable))
     if fields:
-        field_transfer, field_rows = _field_rows(fields, garment, params, len(body.fields))
-        transfer = transfer if bones else field_transfer
-        rows = csr.beside(rows, len(names), field_rows) if bones else field_rows
-        names = names + body.fields
+        transfer, rows = _field_rows(fields, garment, params, len(body.fields))
+        names = body.fields
+    if bones:
+        transfer, bone_rows = _bone_rows(bones, garment, params)
+        rows = csr.beside(rows, len(names), bone_rows)
+        names = names + garment.names
     wanted = np.array([name in body.chosen - garment.locks for name in names], bool)
     # A vertex without a row is one the policy for islands leaves alone.
     written = (np.diff(transfer.weights.indptr) > 0) & garment.writable

@@ -21,11 +21,6 @@ class _TransferStep(_Tab):
     bl_parent_id = "SKINWRIGHT_PT_transfer"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context: Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        self.draw_settings(self.layout.column(), context)
-
 
 class SKINWRIGHT_PT_transfer_presets(PresetPanel, Panel):
     """Ready-made settings by kind of garment."""
@@ -48,11 +43,11 @@ class SKINWRIGHT_PT_transfer(_Tab, Panel):
 
     def draw(self, context: Context) -> None:
         """Problems first, as red rows."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_column(self.layout)
         if problem():
-            _alert(layout, problem())
+            row = layout.row()
+            row.alert = True
+            row.label(text="The native module cannot be used", icon="ERROR")  # the button's tooltip says why
         settings = context.scene.skinwright.transfer
         layout.prop(settings, "source")
         layout.prop(settings, "groups")
@@ -64,9 +59,9 @@ class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):
 
     bl_label = "Matching"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_matching(layout)
+        context.scene.skinwright.transfer.draw_matching(_settings_column(self.layout))
 
 
 class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
@@ -79,8 +74,9 @@ class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
         """Each mesh has its own mask."""
         return context.object is not None and context.object.type == "MESH"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """The group and how it is read."""
+        layout = _settings_column(self.layout)
         settings = context.object.skinwright
         layout.prop_search(settings, "mask_group", context.object, "vertex_groups", icon="GROUP_VERTEX")
         column = layout.column()
@@ -96,9 +92,9 @@ class SKINWRIGHT_PT_transfer_inpainting(_TransferStep, Panel):
 
     bl_label = "Inpainting"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_inpainting(layout)
+        context.scene.skinwright.transfer.draw_inpainting(_settings_column(self.layout))
 
 
 class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
@@ -106,15 +102,15 @@ class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
 
     bl_label = "Writing"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_writing(layout)
+        context.scene.skinwright.transfer.draw_writing(_settings_column(self.layout))
 
 
-def _alert(layout: UILayout, sentence: str) -> None:
-    row = layout.row()
-    row.alert = True
-    row.label(text=sentence, icon="ERROR")
+def _settings_column(layout: UILayout) -> UILayout:
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout.column()
 
 
 CLASSES = (
