@@ -4,7 +4,7 @@ Arrays: positions (V, 3) float32 in one common space (world units), triangles (T
 Angles are radians. An absolute length wins over its relative form when both are given. Every call frees the GIL.
 """
 
-from typing import Any, Literal, final
+from typing import Any, Literal, TypedDict, Unpack, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,28 +56,41 @@ class Transfer:
     @property
     def report(self) -> dict[str, Any]: ...
 
+class TransferSettings(TypedDict, total=False):
+    """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
+
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
+    `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
+    `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
+    """
+
+    max_distance: float | None
+    relative_max_distance: float
+    max_normal_angle: float
+    match_flipped_normals: bool
+    mask: ArrayLike | None
+    smoothness_length: float | None
+    relative_smoothness_length: float
+    smoothing_iterations: int
+    smoothing_factor: float
+    max_influences: int
+    island_policy: IslandPolicy
+
 @final
 class Source:
-    """A body prepared once (checks, BVH, normals) for any number of garments."""
+    """A body prepared once (checks, BVH, normals) for any number of garments. `threads` 0: all of the machine's."""
 
-    def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights) -> Source: ...
+    def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights, *, threads: int = 0) -> Source: ...
     def transfer(
         self,
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
         threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
 
 @final
@@ -95,45 +108,10 @@ class Inpainting:
     @property
     def islands(self) -> NDArray[np.uint32]: ...
     def set_source_weights(self, weights: Weights) -> None: ...
-    def matched(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-    ) -> NDArray[np.bool_]: ...
-    def solve(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
-    ) -> Transfer: ...
-    def start(
-        self,
-        *,
-        max_distance: float | None = None,
-        relative_max_distance: float = 0.05,
-        max_normal_angle: float = ...,
-        match_flipped_normals: bool = True,
-        mask: ArrayLike | None = None,
-        smoothness_length: float | None = None,
-        relative_smoothness_length: float = 0.05,
-        smoothing_iterations: int = 0,
-        smoothing_factor: float = 0.2,
-        max_influences: int = 0,
-        island_policy: IslandPolicy = "bridge",
-    ) -> Job: ...
+    def matched(self, **settings: Unpack[TransferSettings]) -> NDArray[np.bool_]: ...
+    def solve(self, **settings: Unpack[TransferSettings]) -> Transfer: ...
+    def start(self, **settings: Unpack[TransferSettings]) -> Job: ...
+    def raw_weights(self, **settings: Unpack[TransferSettings]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
 
 @final
 class Job:
@@ -155,7 +133,7 @@ def transfer_weights(
     *,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
-    max_normal_angle: float = ...,
+    max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
     smoothness_length: float | None = None,
@@ -166,3 +144,128 @@ def transfer_weights(
     island_policy: IslandPolicy = "bridge",
     threads: int = 0,
 ) -> Transfer: ...
+def linear_blend(
+    rest_positions: ArrayLike, weights: Weights, pose_from_rest: ArrayLike, *, threads: int = 0
+) -> NDArray[np.float32]:
+    """Linear blend skinning exactly as Blender's Armature modifier does it: posed positions (V, 3).
+
+    `rest_positions` (V, 3) and `pose_from_rest` (B, 4, 4) row-major are in the mesh' own space; for Blender,
+    pose_from_rest = object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world. The sum of the matrices
+    times the weights is divided by the weights' sum; a vertex whose weights sum to no more than 0.0001 stays.
+    """
+
+def desparsify(
+    weights: Weights,
+    bone_parents: ArrayLike,
+    *,
+    n: int = 4,
+    method: Literal["hop", "surface"] = "surface",
+    positions: ArrayLike | None = None,
+    triangles: ArrayLike | None = None,
+    bone_segments: ArrayLike | None = None,
+    locked: ArrayLike | None = None,
+    threads: int = 0,
+) -> Weights:
+    """Gives every vertex exactly `n` members, so that sculpting has room: its locked ones, the largest of the others
+    (scaled to fill what the locked ones leave of 1), and new ones at weight zero. Rows come back sorted by bone.
+
+    `bone_parents` (B,) int, negative for a root; `locked` (B,) bool keep their weights and are given to no vertex (pass
+    non-deforming bones as locked too). "surface" needs `positions` (V, 3), `triangles` (T, 3) and `bone_segments`
+    (B, 2, 3), head and tail at rest in the mesh' space: the bones whose regions are nearest along mesh edges, ties by
+    distance to the bone. "hop" takes the nearest in the hierarchy. A row is shorter only if there are no more bones to
+    give, and longer only if more than `n` locked bones are on it.
+    """
+
+@final
+class Stroke:
+    """What a stroke did to the vertices it touched (n)."""
+
+    @property
+    def vertices(self) -> NDArray[np.uint32]:
+        """(n,), as they were given."""
+
+    @property
+    def weights(self) -> Weights:
+        """Their new rows, in that order."""
+
+    @property
+    def reachability(self) -> float:
+        """1 - |residual after| / |residual before|: 1 if the sculpt was reached, 0 if weights could do nothing."""
+
+    @property
+    def residuals(self) -> NDArray[np.float32]:
+        """(n, 3), from the new position to the target, in pose space."""
+
+@final
+class SculptSolver:
+    """A character prepared for strokes: candidates, poses, and what each vertex was sculpted to in each of them.
+
+    All positions and matrices are in the mesh' own space. The members of a vertex (zero weights too, 12 at most) are
+    its candidates; strokes never add or drop one. `locked` (B,) bool bones keep their weights. `kappa` pulls towards
+    the weights before a stroke, relative to the rest diagonal: 0.001 follows the sculpt, 0.05 hardly moves; `passes`
+    of that pull, each starting from the last, take its bias away. Unweighted vertices stay unweighted.
+    """
+
+    def __new__(
+        cls,
+        rest_positions: ArrayLike,
+        weights: Weights,
+        *,
+        locked: ArrayLike | None = None,
+        kappa: float = 0.01,
+        passes: int = 3,
+        threads: int = 0,
+    ) -> SculptSolver: ...
+    def set_options(self, kappa: float, passes: int) -> None:
+        """Says how the next strokes are solved."""
+
+    def add_pose(self, pose_from_rest: ArrayLike, *, alpha: float = 1.0) -> int:
+        """Registers a pose (B, 4, 4), row-major, whose sculpted positions weigh `alpha`, and makes it the pose that is
+        sculpted in. Gives its number; a pose that is there already, up to rounding, keeps the one it has."""
+
+    def guard(self, pose_from_rest: ArrayLike, *, alpha: float = 0.2) -> None:
+        """Makes every vertex hold the position it now has in a pose (B, 4, 4). Guards add up; a stroke takes no longer
+        for them. Rest needs no guard: no weights can change it."""
+
+    def guard_range_of_motion(
+        self, bone_parents: ArrayLike, bone_heads: ArrayLike, joints: ArrayLike, *, alpha: float = 0.2
+    ) -> None:
+        """Guards turns of the bones `joints` and all below them by +-45 and +-90 degrees about the three axes of the
+        mesh' space, where animation is missing. `bone_parents` (B,), `bone_heads` (B, 3); a joint's turns share
+        `alpha`."""
+
+    def clear_guards(self) -> None: ...
+    def posed(self, vertices: ArrayLike, rest_positions: ArrayLike, *, pose: int | None = None) -> NDArray[np.float32]:
+        """Where `rest_positions` (n, 3), one for each of `vertices` (n,), lie in a pose under the present weights. For
+        a brush that moves rest positions, these are the targets of its stroke. `pose`: None for the one added last."""
+
+    def stroke(self, vertices: ArrayLike, targets: ArrayLike, *, pose: int | None = None) -> Stroke:
+        """Takes `targets` (n, 3), the sculpted positions of `vertices` (n,) in a pose, into memory and solves for these
+        vertices. A vertex' targets in other poses stay; an earlier one in this pose is replaced."""
+
+    def undo(self) -> NDArray[np.uint32] | None:
+        """Takes the last stroke back, weights and memory; the vertices it had touched, None if there is none. Then
+        `weights(vertices)` are the rows to write."""
+
+    def redo(self) -> NDArray[np.uint32] | None:
+        """Does the stroke that was last taken back again; likewise."""
+
+    @property
+    def stroke_count(self) -> int:
+        """Number of strokes that can be taken back."""
+
+    def weights(self, vertices: ArrayLike | None = None) -> Weights:
+        """The present weights of all vertices, or one row for each of `vertices`."""
+
+    def reachability(self) -> float | None:
+        """Of the last stroke that has not been taken back."""
+
+    def residuals(self, *, pose: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """The vertices sculpted in a pose (n,), ascending, and from each to its target (n, 3), in pose space."""
+
+    def rest_residuals(self, *, pose: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """The same in rest space, T^-1 r: the offsets of a corrective shape key driven by the pose."""
+
+def simplex_qp(h: ArrayLike, g: ArrayLike, start: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
+    """Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for P problems of N <= 12 unknowns at once: the
+    solver inside of a stroke. `h` (P, N, N) symmetric positive definite, `g` and `start` (P, N), starts feasible."""

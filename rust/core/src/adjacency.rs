@@ -1,1 +1,165 @@
-//! Placeholder until the transfer work lands.
+//! Who touches whom on a triangle mesh: clean triangles, triangles around a vertex, islands.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+/// Marks a vertex that no triangle uses, in every per-vertex index array.
+pub const NONE: u32 = u32::MAX;
+
+/// The triangles around each vertex, compressed by vertex, ascending.
+#[derive(Debug)]
+pub struct VertexTriangles {
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl VertexTriangles {
+    /// Collects the triangles (T, 3) around each of `vertex_count` vertices.
+    pub fn new(triangles: &[[u32; 3]], vertex_count: usize) -> Self {
+        let mut starts = vec![0u32; vertex_count + 1];
+        for &i in triangles.as_flattened() {
+            starts[i as usize + 1] += 1;
+        }
+        for i in 0..vertex_count {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut around = vec![0u32; triangles.len() * 3];
+        for (t, corners) in triangles.iter().enumerate() {
+            for &i in corners {
+                around[next[i as usize] as usize] = t as u32;
+                next[i as usize] += 1;
+            }
+        }
+        Self { starts, triangles: around }
+    }
+
+    /// The triangles around vertex `i`.
+    pub fn around(&self, i: usize) -> &[u32] {
+        &self.triangles[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    /// Whether any triangle uses vertex `i`.
+    pub fn is_used(&self, i: usize) -> bool {
+        self.starts[i] < self.starts[i + 1]
+    }
+}
+
+/// Drops triangles that name a vertex twice, and every repetition of the same three vertices (whatever the winding).
+/// Both would put NaN or a doubled stiffness into the Laplacian. Returns the triangles that stay, in order, and who
+/// touches them.
+pub fn clean_triangles(triangles: &[[u32; 3]], vertex_count: usize) -> (Cow<'_, [[u32; 3]]>, VertexTriangles) {
+    let repeats_a_vertex = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    let mut clean = Cow::Borrowed(triangles);
+    if triangles.par_iter().any(repeats_a_vertex) {
+        clean = Cow::Owned(triangles.iter().filter(|t| !repeats_a_vertex(t)).copied().collect());
+    }
+    let around = VertexTriangles::new(&clean, vertex_count);
+    let duplicates = duplicated_triangles(&clean, &around, vertex_count);
+    if duplicates.is_empty() {
+        return (clean, around);
+    }
+    let mut dropped = duplicates.iter().peekable();
+    let keep = |&(t, _): &(usize, &[u32; 3])| dropped.next_if(|&&d| d as usize == t).is_none();
+    let clean: Vec<_> = clean.iter().enumerate().filter(keep).map(|(_, &corners)| corners).collect();
+    let around = VertexTriangles::new(&clean, vertex_count);
+    (Cow::Owned(clean), around)
+}
+
+/// Every triangle whose vertex set an earlier triangle has already, ascending. Equal sets meet at their smallest vertex.
+fn duplicated_triangles(triangles: &[[u32; 3]], around: &VertexTriangles, vertex_count: usize) -> Vec<u32> {
+    let sorted = |t: u32| {
+        let mut corners = triangles[t as usize];
+        corners.sort_unstable();
+        corners
+    };
+    let at_vertex = |seen: &mut Vec<([u32; 3], u32)>, i: usize| {
+        seen.clear();
+        seen.extend(around.around(i).iter().map(|&t| (sorted(t), t)).filter(|(corners, _)| corners[0] as usize == i));
+        seen.sort_unstable();
+        seen.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect::<Vec<_>>()
+    };
+    let mut duplicates: Vec<u32> =
+        (0..vertex_count).into_par_iter().map_init(Vec::new, at_vertex).flatten_iter().collect();
+    duplicates.sort_unstable();
+    duplicates
+}
+
+/// The islands (connected components of the face graph) of a mesh, numbered by their smallest vertex.
+#[derive(Debug)]
+pub struct Islands {
+    of_vertex: Vec<u32>,
+    count: usize,
+}
+
+impl Islands {
+    /// Finds the islands of `triangles` (T, 3) over `vertex_count` vertices.
+    pub fn new(triangles: &[[u32; 3]], vertex_count: usize) -> Self {
+        let mut sets = DisjointSets::new(vertex_count);
+        let mut used = vec![false; vertex_count];
+        for &[a, b, c] in triangles {
+            sets.union(a, b);
+            sets.union(a, c);
+            for i in [a, b, c] {
+                used[i as usize] = true;
+            }
+        }
+        let (of_vertex, count) = sets.number(|i| used[i as usize]);
+        Self { of_vertex, count }
+    }
+
+    /// Island of each vertex (V), [`NONE`] for a vertex that no triangle uses.
+    pub fn of_vertex(&self) -> &[u32] {
+        &self.of_vertex
+    }
+
+    /// Number of islands.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+}
+
+/// Union-find whose representative is always the smallest member, so results do not depend on the order of unions.
+#[derive(Debug)]
+pub struct DisjointSets {
+    parent: Vec<u32>,
+}
+
+impl DisjointSets {
+    /// `count` sets of one member each.
+    pub fn new(count: usize) -> Self {
+        Self { parent: (0..count as u32).collect() }
+    }
+
+    /// The smallest member of the set that holds `i`.
+    pub fn find(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            let grandparent = self.parent[self.parent[i as usize] as usize];
+            self.parent[i as usize] = grandparent;
+            i = grandparent;
+        }
+        i
+    }
+
+    /// Merges the sets of `i` and `j`.
+    pub fn union(&mut self, i: u32, j: u32) {
+        let (i, j) = (self.find(i), self.find(j));
+        self.parent[i.max(j) as usize] = i.min(j);
+    }
+
+    /// Numbers the sets 0.. by smallest member, over the members that `keep` accepts; the others get [`NONE`].
+    pub fn number(mut self, keep: impl Fn(u32) -> bool) -> (Vec<u32>, usize) {
+        let mut number = vec![NONE; self.parent.len()];
+        let mut count = 0;
+        for i in (0..self.parent.len() as u32).filter(|&i| keep(i)) {
+            let root = self.find(i) as usize;
+            if number[root] == NONE {
+                number[root] = count;
+                count += 1;
+            }
+            number[i as usize] = number[root];
+        }
+        (number, count as usize)
+    }
+}

@@ -40,6 +40,14 @@ pub enum Error {
         /// Bone of the offending entry.
         bone: u32,
     },
+    /// A negative weight where only influences make sense.
+    #[error("vertex {vertex} has a negative weight (bone {bone})")]
+    WeightNegative {
+        /// First offending vertex.
+        vertex: usize,
+        /// Bone of the offending entry.
+        bone: u32,
+    },
     /// CSR arrays that do not describe a matrix.
     #[error("the weight arrays do not fit together: {reason}")]
     InvalidWeights {

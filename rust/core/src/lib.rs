@@ -6,11 +6,14 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod desparsify;
 pub mod error;
 pub mod laplacian;
 pub mod linear_solve;
 pub mod mesh;
 pub mod progress;
+pub mod sculpt;
+pub mod skinning;
 pub mod surface;
 pub mod transfer;
 pub mod weights;

@@ -1,6 +1,11 @@
 //! Skin weights as a sparse matrix (CSR), the only form in which they cross a boundary.
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
+
+/// Rows a worker builds at a time.
+const ROWS_A_RUN: usize = 4096;
 
 /// Skin weights of V vertices over `n_bones` bones: row i holds the influences of vertex i.
 ///
@@ -38,27 +43,62 @@ impl Weights {
             return invalid(format!("bone {bone} is out of range, there are {n_bones}"));
         }
         if let Some(at) = values.iter().position(|x| !x.is_finite()) {
-            let vertex = indptr.partition_point(|&start| start as usize <= at) - 1;
-            return Err(Error::WeightNotFinite { vertex, bone: bones[at] });
+            let bone = bones[at];
+            let vertex = Self { indptr, bones, values, n_bones }.vertex_of_entry(at);
+            return Err(Error::WeightNotFinite { vertex, bone });
         }
         Ok(Self { indptr, bones, values, n_bones })
     }
 
-    /// One list of (bone, weight) a vertex.
-    pub(crate) fn from_rows<'r>(rows: impl Iterator<Item = &'r [(u32, f64)]>, n_bones: u32) -> Self {
-        let mut out = Self { indptr: vec![0], n_bones, ..Self::default() };
-        for row in rows {
-            out.push_row(row);
-        }
-        out
+    /// Builds V rows in parallel: `row(state, i, out)` appends the influences of vertex i to `out`, in bone order.
+    /// `state` is one worker's scratch memory; the answer must not depend on what an earlier row left in it.
+    pub(crate) fn from_rows<S>(
+        vertex_count: usize,
+        n_bones: u32,
+        state: impl Fn() -> S + Sync,
+        row: impl Fn(&mut S, usize, &mut Vec<(u32, f32)>) + Sync,
+    ) -> Self {
+        let run = |k: usize| {
+            let mut part = Self { indptr: Vec::with_capacity(ROWS_A_RUN), n_bones, ..Self::default() };
+            let (mut state, mut influences) = (state(), Vec::new());
+            for i in k * ROWS_A_RUN..((k + 1) * ROWS_A_RUN).min(vertex_count) {
+                influences.clear();
+                row(&mut state, i, &mut influences);
+                part.bones.extend(influences.iter().map(|&(bone, _)| bone));
+                part.values.extend(influences.iter().map(|&(_, value)| value));
+                part.indptr.push(part.bones.len() as u32);
+            }
+            part
+        };
+        let parts: Vec<Self> = (0..vertex_count.div_ceil(ROWS_A_RUN)).into_par_iter().map(run).collect();
+        Self::concatenate(parts, n_bones)
     }
 
-    pub(crate) fn push_row(&mut self, row: &[(u32, f64)]) {
-        for &(bone, value) in row {
-            self.bones.push(bone);
-            self.values.push(value as f32);
+    fn concatenate(parts: Vec<Self>, n_bones: u32) -> Self {
+        let nnz = parts.iter().map(|part| part.bones.len()).sum();
+        let mut indptr = Vec::with_capacity(parts.len() * ROWS_A_RUN + 1);
+        let (mut bones, mut values) = (Vec::with_capacity(nnz), Vec::with_capacity(nnz));
+        indptr.push(0);
+        for part in parts {
+            let offset = bones.len() as u32;
+            indptr.extend(part.indptr.iter().map(|end| offset + end));
+            bones.extend(part.bones);
+            values.extend(part.values);
         }
-        self.indptr.push(self.bones.len() as u32);
+        Self { indptr, bones, values, n_bones }
+    }
+
+    /// # Errors
+    /// [`Error::WeightNegative`] with the first negative entry.
+    pub fn check_not_negative(&self) -> Result<()> {
+        self.values
+            .iter()
+            .position(|&x| x < 0.0)
+            .map_or(Ok(()), |at| Err(Error::WeightNegative { vertex: self.vertex_of_entry(at), bone: self.bones[at] }))
+    }
+
+    fn vertex_of_entry(&self, at: usize) -> usize {
+        self.indptr.partition_point(|&start| start as usize <= at) - 1
     }
 
     /// Number of vertices.

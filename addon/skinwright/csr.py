@@ -1,0 +1,82 @@
+"""Arithmetic on CSR weight rows (indptr, bones, values); numpy only."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Rows(NamedTuple):
+    """Weights as CSR: row r spans `bones` and `values` from indptr[r] to indptr[r + 1]; bones index a list of names."""
+
+    indptr: NDArray[np.uint32]
+    bones: NDArray[np.uint32]
+    values: NDArray[np.float32]
+
+
+def empty(n_rows: int) -> Rows:
+    """Rows without an entry."""
+    return Rows(np.zeros(n_rows + 1, np.uint32), np.zeros(0, np.uint32), np.zeros(0, np.float32))
+
+
+def entry_vertices(rows: Rows) -> NDArray[np.int64]:
+    """(nnz,) the row of every entry."""
+    return np.repeat(np.arange(len(rows.indptr) - 1), np.diff(rows.indptr))
+
+
+def row_sums(rows: Rows) -> NDArray[np.float64]:
+    """(V,) the sum of every row."""
+    sums = np.bincount(entry_vertices(rows), weights=rows.values, minlength=len(rows.indptr) - 1)
+    return sums.astype(np.float64)  # numpy counts in integers where there is no entry at all
+
+
+def from_entries(vertex: NDArray, bone: NDArray, value: NDArray, n_rows: int) -> Rows:
+    """Rows of entries in any order; entries of one place are added up, those of weight 0 dropped."""
+    width = int(bone.max(initial=0)) + 1
+    place, inverse = np.unique(vertex.astype(np.int64) * width + bone, return_inverse=True)
+    total = np.bincount(inverse, weights=value, minlength=len(place))
+    place, total = place[total != 0], total[total != 0]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(place // width, minlength=n_rows))])
+    return Rows(indptr.astype(np.uint32), (place % width).astype(np.uint32), total.astype(np.float32))
+
+
+def _keep(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
+    indptr = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
+    return Rows(indptr.astype(np.uint32), rows.bones[kept], rows.values[kept])
+
+
+def keep_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
+    """The entries whose bone is marked in `columns` (B,)."""
+    return _keep(rows, columns[rows.bones])
+
+
+def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
+    """The same, with the kept columns numbered anew."""
+    kept = keep_columns(rows, columns)
+    return kept._replace(bones=(np.cumsum(columns) - 1).astype(np.uint32)[kept.bones])
+
+
+def keep_largest(rows: Rows, most: NDArray[np.integer]) -> Rows:
+    """At most `most` (V,) entries a row, the largest; of equal ones that of the lower bone."""
+    vertex = entry_vertices(rows)
+    order = np.lexsort((rows.bones, -rows.values, vertex))
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order)) - rows.indptr[vertex[order]]
+    return _keep(rows, rank < most[vertex])
+
+
+def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
+    """Rows over the `n_columns` columns of `left`, then those of `right`."""
+    vertex = np.concatenate([entry_vertices(left), entry_vertices(right)])
+    order = np.argsort(vertex, kind="stable")
+    bones = np.concatenate([left.bones, right.bones + np.uint32(n_columns)])
+    values = np.concatenate([left.values, right.values])
+    return Rows(left.indptr + right.indptr, bones[order], values[order])
+
+
+def take_rows(rows: Rows, indices: NDArray[np.integer]) -> Rows:
+    """The rows of these indices, in their order."""
+    counts = np.diff(rows.indptr)[indices].astype(np.int64)
+    indptr = np.concatenate([[0], np.cumsum(counts)])
+    entries = np.arange(indptr[-1]) + np.repeat(rows.indptr[indices] - indptr[:-1], counts)
+    return Rows(indptr.astype(np.uint32), rows.bones[entries], rows.values[entries])

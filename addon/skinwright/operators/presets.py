@@ -1,0 +1,35 @@
+"""Saving the panel's settings as a preset, and the presets that come with the extension."""
+
+import os
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bpy.types import Operator
+
+from ..properties import TransferOptions
+
+PRESET_PATH = os.path.dirname(os.path.dirname(__file__))
+
+
+class SKINWRIGHT_OT_transfer_preset_add(AddPresetBase, Operator):
+    """Add or remove a preset of the panel's settings"""
+
+    bl_idname = "skinwright.transfer_preset_add"
+    bl_label = "Add Garment Preset"
+
+    preset_menu = "SKINWRIGHT_PT_transfer_presets"
+    preset_subdir = "skinwright/transfer_weights"
+    preset_defines = ["settings = bpy.context.scene.skinwright.transfer"]
+    preset_values = [f"settings.{name}" for name in TransferOptions.__annotations__]
+
+
+def register() -> None:
+    """Register the operator and the folder of presets."""
+    bpy.utils.register_class(SKINWRIGHT_OT_transfer_preset_add)
+    bpy.utils.register_preset_path(PRESET_PATH)
+
+
+def unregister() -> None:
+    """Unregister both."""
+    bpy.utils.unregister_preset_path(PRESET_PATH)
+    bpy.utils.unregister_class(SKINWRIGHT_OT_transfer_preset_add)

@@ -1,0 +1,68 @@
+"""What a transfer has done, as a sentence with counts, as warnings, and as JSON."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass
+class GarmentReport:
+    """One target. `matched`, `inpainted` and `untouched` count vertices; `native` is what the library says."""
+
+    target: str
+    vertices: int
+    matched: int
+    inpainted: int
+    untouched: int
+    groups: int
+    created_groups: list[str]
+    locked_groups: list[str]
+    kept_groups: list[str]
+    armature_added: bool
+    seconds: dict[str, float]
+    native: dict[str, Any]
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Report:
+    """All targets of one transfer."""
+
+    source: str
+    garments: list[GarmentReport]
+    warnings: list[str] = field(default_factory=list)
+
+    def sentence(self) -> str:
+        """The line the artist reads when it is done."""
+        names = ", ".join(garment.target for garment in self.garments)
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
+        counts.append(f"{self._sum('inpainted')} inpainted")
+        if self._sum("untouched"):
+            counts.append(f"{self._sum('untouched')} left as they were")
+        loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
+        if loose:
+            counts.append(f"{loose} loose parts")
+        created = sum(len(garment.created_groups) for garment in self.garments)
+        seconds = sum(sum(garment.seconds.values()) for garment in self.garments)
+        groups = f"{self._sum('groups')} groups written, {created} of them new"
+        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s"
+
+    def _sum(self, name: str) -> int:
+        return sum(getattr(garment, name) for garment in self.garments)
+
+    def all_warnings(self) -> list[str]:
+        """Sentences worth a look, the body's first."""
+        return self.warnings + [warning for garment in self.garments for warning in garment.warnings]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values only."""
+        garments = [_plain(vars(garment)) for garment in self.garments]
+        return {"source": self.source, "garments": garments, "warnings": self.warnings, "sentence": self.sentence()}
+
+
+def _plain(value: Any) -> Any:
+    """The same with numpy's scalars and arrays as Python's."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return value.tolist() if hasattr(value, "tolist") else value

@@ -1,0 +1,217 @@
+"""Meshes as arrays in world space, at rest or as the modifiers that only deform leave them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .error import SceneError
+
+# These keep every vertex and its index. All others (Geometry Nodes too) may change the topology.
+_KEEPS_TOPOLOGY = {
+    "ARMATURE",
+    "CAST",
+    "CLOTH",
+    "CORRECTIVE_SMOOTH",
+    "CURVE",
+    "DATA_TRANSFER",
+    "DISPLACE",
+    "HOOK",
+    "LAPLACIANDEFORM",
+    "LAPLACIANSMOOTH",
+    "LATTICE",
+    "MESH_CACHE",
+    "MESH_DEFORM",
+    "NORMAL_EDIT",
+    "SHRINKWRAP",
+    "SIMPLE_DEFORM",
+    "SMOOTH",
+    "SOFT_BODY",
+    "SURFACE_DEFORM",
+    "UV_PROJECT",
+    "UV_WARP",
+    "VERTEX_WEIGHT_EDIT",
+    "VERTEX_WEIGHT_MIX",
+    "VERTEX_WEIGHT_PROXIMITY",
+    "WARP",
+    "WAVE",
+    "WEIGHTED_NORMAL",
+}
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """positions (V, 3) f32 in world units, triangles (T, 3) u32 whose winding gives outward normals in the world."""
+
+    positions: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+
+    @property
+    def size(self) -> NDArray[np.float32]:
+        """Edge lengths (3,) of the bounding box, world units."""
+        return np.ptp(self.positions, axis=0)
+
+
+def read(obj: bpy.types.Object, *, evaluated: bool = False) -> Geometry:
+    """The object's original vertices in world space: at rest (Basis, no modifiers), or as posed and deformed now.
+
+    Raises SceneError for an empty mesh, a coordinate that is not finite and a world matrix that flattens the object.
+    """
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    determinant = _checked_determinant(obj, matrix)
+    local = _evaluated_positions(obj) if evaluated else rest_positions(obj.data)
+    triangle = triangles(obj)
+    if determinant < 0:
+        triangle = triangle[:, ::-1]
+    with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
+        positions = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    _check_finite(obj, positions)
+    return Geometry(positions, np.ascontiguousarray(triangle))
+
+
+def is_sheared(obj: bpy.types.Object) -> bool:
+    """Whether the object's axes are not at right angles in the world."""
+    axes = np.array(obj.matrix_world.to_3x3(), dtype=np.float64)
+    axes /= np.linalg.norm(axes, axis=0)
+    return bool(np.abs(axes.T @ axes - np.eye(3)).max() > 1e-3)
+
+
+def selected(obj: bpy.types.Object) -> NDArray[np.bool_]:
+    """(V,) the vertices selected in Edit mode or by the paint mask, whose faces count while painting."""
+    mesh = obj.data
+    select = np.zeros(len(mesh.vertices), bool)
+    if obj.mode != "WEIGHT_PAINT" or not mesh.use_paint_mask:
+        mesh.vertices.foreach_get("select", select)
+        return select
+    faces, corners = np.empty(len(mesh.polygons), bool), np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("select", faces)
+    mesh.polygons.foreach_get("loop_total", corners)
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    select[vertices[np.repeat(faces, corners)]] = True
+    return select
+
+
+def edges(obj: bpy.types.Object) -> NDArray[np.int32]:
+    """(E, 2) vertices of the edges."""
+    vertices = np.empty(len(obj.data.edges) * 2, np.int32)
+    obj.data.edges.foreach_get("vertices", vertices)
+    return vertices.reshape(-1, 2)
+
+
+def select(obj: bpy.types.Object, chosen: NDArray[np.bool_]) -> None:
+    """Select these vertices (V,) and what lies wholly between them; not in Edit mode."""
+    mesh = obj.data
+    mesh.vertices.foreach_set("select", chosen)
+    mesh.edges.foreach_set("select", chosen[edges(obj)].all(axis=1))
+    start, corner = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.loops), np.int32)
+    mesh.polygons.foreach_get("loop_start", start)
+    mesh.loops.foreach_get("vertex_index", corner)
+    if start.size:
+        mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corner], start))
+    mesh.update()
+
+
+def other_users(obj: bpy.types.Object) -> list[str]:
+    """Names of the other objects that show the same mesh, and with it the same vertex groups."""
+    return [other.name for other in bpy.data.objects if other.data == obj.data and other != obj]
+
+
+@contextmanager
+def object_mode(context: bpy.types.Context) -> Iterator[None]:
+    """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it."""
+    edited = list(context.objects_in_mode) if context.mode == "EDIT_MESH" else []
+    if edited:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    try:
+        yield
+    finally:
+        if edited:
+            with _only_selected(context, edited):
+                bpy.ops.object.mode_set(mode="EDIT")
+
+
+@contextmanager
+def _only_selected(context: bpy.types.Context, objects: list[bpy.types.Object]) -> Iterator[None]:
+    """Entering Edit mode takes every selected mesh along: select just these for the moment."""
+    before = list(context.view_layer.objects.selected)
+    for obj in {*before, *objects}:
+        obj.select_set(obj in objects)
+    try:
+        yield
+    finally:
+        for obj in {*before, *objects}:
+            obj.select_set(obj in before)
+
+
+def _checked_determinant(obj: bpy.types.Object, matrix: NDArray[np.float64]) -> float:
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    determinant = float(np.linalg.det(matrix[:3, :3]))
+    if not np.isfinite(matrix).all() or abs(determinant) <= 1e-9 * max(lengths) ** 3:
+        raise SceneError(f"{obj.name} is scaled to nothing along an axis: give it a scale other than 0")
+    return determinant
+
+
+def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(V, 3) local positions that modifiers start from."""
+    # With shape keys it is the Basis that the armature deforms; the mesh's own positions may lag behind it.
+    if mesh.shape_keys:
+        return _vectors(mesh.shape_keys.reference_key.data, "co")
+    return positions(mesh)
+
+
+def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(V, 3) local positions of a mesh, evaluated or not."""
+    if not mesh.vertices:
+        return np.empty((0, 3), np.float32)
+    return _vectors(mesh.attributes["position"].data, "vector")
+
+
+def _vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32]:
+    values = np.empty(len(collection) * 3, np.float32)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, 3)
+
+
+def _evaluated_positions(obj: bpy.types.Object) -> NDArray[np.float32]:
+    with _topology_kept(obj):
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        now = positions(evaluated.data)
+    if not evaluated.is_evaluated:
+        raise SceneError(f"{obj.name} is disabled or excluded, so it has no current shape: show it or use rest shapes")
+    if len(now) != len(obj.data.vertices):
+        raise SceneError(f"{obj.name} has another number of vertices when evaluated: use rest shapes")
+    return now
+
+
+@contextmanager
+def _topology_kept(obj: bpy.types.Object) -> Iterator[None]:
+    """Switch off, for the moment, the modifiers after which a vertex is no longer the vertex that carries weights."""
+    hidden = [m for m in obj.modifiers if m.show_viewport and m.type not in _KEEPS_TOPOLOGY]
+    try:
+        for modifier in hidden:
+            modifier.show_viewport = False
+        yield
+    finally:
+        for modifier in hidden:
+            modifier.show_viewport = True
+
+
+def _check_finite(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if bad.size:
+        raise SceneError(f"{obj.name} has a coordinate that is not a number at vertex {bad[0]}: move or delete it")
+
+
+def triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
+    """(T, 3) of its faces as they are, before modifiers. Raises SceneError where there are none."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    if not mesh.loop_triangles:
+        raise SceneError(f"{obj.name} has no faces: weights are carried over surfaces, so give it some")
+    triangle = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangle)
+    return triangle.reshape(-1, 3).astype(np.uint32)

@@ -1,0 +1,23 @@
+"""Entries in Blender's own menus."""
+
+from bpy.types import Context, Menu, VIEW3D_MT_make_links, VIEW3D_MT_paint_weight
+
+
+def _transfer_weights(menu: Menu, _context: Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator("skinwright.transfer_weights", text="Transfer Weights (Skinwright)")
+
+
+ENTRIES = ((VIEW3D_MT_paint_weight, _transfer_weights), (VIEW3D_MT_make_links, _transfer_weights))
+
+
+def register() -> None:
+    """Append the entries."""
+    for menu, draw in ENTRIES:
+        menu.append(draw)
+
+
+def unregister() -> None:
+    """Remove them."""
+    for menu, draw in ENTRIES:
+        menu.remove(draw)

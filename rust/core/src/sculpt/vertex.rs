@@ -1,0 +1,155 @@
+//! The problem of one vertex.
+
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use super::{MAX_MEMBERS, SculptSolver, SimplexQp};
+use crate::skinning::LEAST_TOTAL_WEIGHT;
+
+/// What the guard poses ask of every vertex: sum of alpha E'E over its members, lower triangles packed by row.
+///
+/// Empty until the first guard.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Guards {
+    starts: Vec<usize>,
+    packed: Vec<f64>,
+}
+
+impl Guards {
+    /// Adds the pose's E'E to every vertex, the target being where the vertex now lies in it.
+    pub(super) fn hold(&mut self, solver: &SculptSolver, pose_from_rest: &[DAffine3], alpha: f64) {
+        if self.starts.is_empty() {
+            self.starts = std::iter::once(0)
+                .chain((0..solver.vertex_count()).scan(0, |end, i| {
+                    *end += packed_length(solver.range(i).len());
+                    Some(*end)
+                }))
+                .collect();
+            self.packed = vec![0.0; self.starts[solver.vertex_count()]];
+        }
+        let mut rest = self.packed.as_mut_slice();
+        let mut triangles = Vec::with_capacity(solver.vertex_count());
+        for window in self.starts.windows(2) {
+            let (triangle, after) = rest.split_at_mut(window[1] - window[0]);
+            triangles.push(triangle);
+            rest = after;
+        }
+        triangles.into_par_iter().enumerate().with_min_len(1024).for_each(|(i, triangle)| {
+            let (bones, values) = solver.row(i);
+            let target =
+                crate::skinning::blended_transform(bones, values, pose_from_rest).transform_point3(solver.rest[i]);
+            let mut offsets = [DVec3::ZERO; MAX_MEMBERS];
+            solver.offsets(i, pose_from_rest, target, &mut offsets);
+            let pairs = (0..bones.len()).flat_map(|a| (0..=a).map(move |b| (a, b)));
+            for (entry, (a, b)) in triangle.iter_mut().zip(pairs) {
+                *entry += alpha * offsets[a].dot(offsets[b]);
+            }
+        });
+    }
+
+    fn entry(&self, i: usize, a: usize, b: usize) -> f64 {
+        self.starts.get(i).map_or(0.0, |start| self.packed[start + packed_length(a.max(b)) + a.min(b)])
+    }
+}
+
+fn packed_length(n: usize) -> usize {
+    n * (n + 1) / 2
+}
+
+impl SculptSolver {
+    /// E of one pose: where each member alone would take vertex `i`, from `target`, in rest diagonals.
+    fn offsets(&self, i: usize, pose_from_rest: &[DAffine3], target: DVec3, offsets: &mut [DVec3]) {
+        for (offset, &bone) in offsets.iter_mut().zip(&self.bones[self.range(i)]) {
+            *offset = (pose_from_rest[bone as usize].transform_point3(self.rest[i]) - target) / self.diagonal;
+        }
+    }
+
+    /// The weights of vertex `i` that best meet its targets and guards, in the order of its members.
+    pub(super) fn solve_vertex(&self, i: usize) -> [f32; MAX_MEMBERS] {
+        if self.range(i).len() <= 4 { self.solve_members::<4>(i) } else { self.solve_members::<MAX_MEMBERS>(i) }
+    }
+
+    fn solve_members<const N: usize>(&self, i: usize) -> [f32; MAX_MEMBERS] {
+        let (bones, values) = self.row(i);
+        let mut solved = [0.0; MAX_MEMBERS];
+        solved[..values.len()].copy_from_slice(values);
+        let total: f64 = values.iter().map(|&x| f64::from(x)).sum();
+        let members = FreeFirst::<N>::of(bones, &self.locked);
+        let mut w = members.order.map(|a| values.get(a).map_or(0.0, |&x| f64::from(x) / total));
+        let mass: f64 = w[..members.free].iter().sum();
+        // An unweighted vertex is not skinned, and has no feasible weights to start from.
+        if total <= LEAST_TOTAL_WEIGHT || mass <= 0.0 {
+            return solved;
+        }
+        let h = self.quadratic(i, &members);
+        self.minimise(h, &members, mass, &mut w);
+        // A row that holds a locked weight keeps its sum, or the locked share would change.
+        let sum = if members.free < members.len { total } else { 1.0 };
+        for (&a, &x) in members.order[..members.free].iter().zip(&w) {
+            solved[a] = (x * sum) as f32;
+        }
+        solved
+    }
+
+    /// H = sum of alpha E'E over targets and guards, members free ones first.
+    fn quadratic<const N: usize>(&self, i: usize, members: &FreeFirst<N>) -> [[f64; N]; N] {
+        let mut h = [[0.0; N]; N];
+        for (a, row) in h.iter_mut().enumerate().take(members.len) {
+            for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
+                *entry = self.guards.entry(i, members.order[a], members.order[b]);
+            }
+        }
+        for target in &self.targets[i] {
+            let pose = &self.poses[target.pose];
+            let mut offsets = [DVec3::ZERO; N];
+            self.offsets(i, &pose.pose_from_rest, target.position, &mut offsets);
+            let e = members.order.map(|a| offsets[a]);
+            for (a, row) in h.iter_mut().enumerate().take(members.len) {
+                for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
+                    *entry += pose.alpha * e[a].dot(e[b]);
+                }
+            }
+        }
+        h
+    }
+
+    /// Proximal passes over the free members; the locked ones only shift the linear term.
+    fn minimise<const N: usize>(&self, h: [[f64; N]; N], members: &FreeFirst<N>, mass: f64, w: &mut [f64; N]) {
+        let pull = self.options.kappa * self.options.kappa;
+        let mut shift = [0.0; N];
+        for (a, s) in shift.iter_mut().enumerate().take(members.free) {
+            *s = (members.free..members.len).map(|b| -h[b][a] * w[b]).sum();
+        }
+        let mut qp = SimplexQp { h, g: shift, n: members.free, mass };
+        for a in 0..members.free {
+            qp.h[a][a] += pull;
+        }
+        for _ in 0..self.options.passes {
+            for a in 0..members.free {
+                qp.g[a] = shift[a] + pull * w[a];
+            }
+            qp.minimise(w);
+        }
+    }
+}
+
+/// The members of a vertex by position in its row, those that may change first.
+struct FreeFirst<const N: usize> {
+    order: [usize; N],
+    free: usize,
+    len: usize,
+}
+
+impl<const N: usize> FreeFirst<N> {
+    fn of(bones: &[u32], locked: &[bool]) -> Self {
+        let mut members = Self { order: std::array::from_fn(|a| a), free: 0, len: bones.len().min(N) };
+        for a in 0..members.len {
+            if !locked[bones[a] as usize] {
+                members.order[..=a].rotate_right(1);
+                members.free += 1;
+            }
+        }
+        members.order[..members.free].reverse();
+        members
+    }
+}

@@ -1,0 +1,151 @@
+//! The body that weights come from, prepared once for any number of garments.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::mesh::TriMesh;
+use crate::surface::{SurfaceIndex, SurfacePoint};
+use crate::weights::Weights;
+
+/// A weighted mesh with its bounding volume hierarchy and normals. Owns its data; a clone shares it.
+#[derive(Debug, Clone)]
+pub struct Source {
+    geometry: Arc<Geometry>,
+    weights: Arc<SourceWeights>,
+}
+
+#[derive(Debug)]
+struct Geometry {
+    triangles: Vec<[u32; 3]>,
+    index: SurfaceIndex,
+    normals: Vec<Vec3>,
+    diagonal: f64,
+}
+
+/// The source's weights and what is wrong with them.
+#[derive(Debug)]
+struct SourceWeights {
+    weights: Weights,
+    inverse_sums: Vec<f64>,
+}
+
+impl Source {
+    /// Prepares a mesh (V positions in world units, T triangles) and its weights (V rows).
+    ///
+    /// # Errors
+    /// Those of [`TriMesh::new`], [`Error::LengthMismatch`], [`Error::WeightNegative`].
+    pub fn new(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, weights: Weights) -> Result<Self> {
+        let mesh = TriMesh::new(positions, &triangles, "source")?;
+        let weights = SourceWeights::new(weights, mesh.vertex_count())?;
+        let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), || mesh.vertex_normals());
+        let diagonal = mesh.diagonal();
+        let geometry = Geometry { index, normals, diagonal, triangles };
+        Ok(Self { geometry: Arc::new(geometry), weights: Arc::new(weights) })
+    }
+
+    /// The same prepared geometry with other weights (V rows).
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`], [`Error::WeightNegative`].
+    pub fn with_weights(&self, weights: Weights) -> Result<Self> {
+        let weights = SourceWeights::new(weights, self.geometry.normals.len())?;
+        Ok(Self { geometry: Arc::clone(&self.geometry), weights: Arc::new(weights) })
+    }
+
+    /// Triangles, (T, 3).
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.geometry.triangles
+    }
+
+    /// Area-weighted vertex normals, (V, 3).
+    pub fn normals(&self) -> &[Vec3] {
+        &self.geometry.normals
+    }
+
+    /// The closest-point index over the triangles.
+    pub fn index(&self) -> &SurfaceIndex {
+        &self.geometry.index
+    }
+
+    /// Diagonal of the bounding box, world units.
+    pub fn diagonal(&self) -> f64 {
+        self.geometry.diagonal
+    }
+
+    /// Number of bones.
+    pub fn n_bones(&self) -> u32 {
+        self.weights.weights.n_bones()
+    }
+
+    /// Vertices whose weights sum to zero, and those whose sum is neither zero nor one (to 1e-3).
+    pub fn unweighted_and_unnormalised(&self) -> (usize, usize) {
+        let unweighted = self.weights.inverse_sums.iter().filter(|&&x| x == 0.0).count();
+        let off = |x: &&f64| (**x - 1.0).abs() > 1e-3;
+        let unnormalised = self.weights.inverse_sums.iter().filter(|&&x| x != 0.0).filter(off).count();
+        (unweighted, unnormalised)
+    }
+
+    /// Weights at a surface point: the barycentric blend of the three normalised rows, itself normalised, appended to
+    /// `row` in bone order. Nothing is appended where all three rows are empty.
+    pub fn blend(&self, point: &SurfacePoint, row: &mut Vec<(u32, f64)>) {
+        let start = row.len();
+        for (i, share) in std::iter::zip(self.geometry.triangles[point.triangle as usize], point.barycentric) {
+            let (bones, values) = self.weights.weights.row(i as usize);
+            let scale = share * self.weights.inverse_sums[i as usize];
+            if scale > 0.0 {
+                row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value) * scale)));
+            }
+        }
+        merge_and_normalise(row, start);
+    }
+
+    /// Whether [`Source::blend`] gives anything at each point.
+    pub(super) fn weighted(&self, points: &[SurfacePoint]) -> Vec<bool> {
+        let inverse_sums = &self.weights.inverse_sums;
+        let has_weight = |point: &SurfacePoint| {
+            let corners = self.geometry.triangles[point.triangle as usize];
+            std::iter::zip(corners, point.barycentric).any(|(i, share)| share * inverse_sums[i as usize] > 0.0)
+        };
+        points.par_iter().map(has_weight).collect()
+    }
+}
+
+impl SourceWeights {
+    fn new(weights: Weights, vertex_count: usize) -> Result<Self> {
+        if weights.vertex_count() != vertex_count {
+            let found = weights.vertex_count();
+            return Err(Error::LengthMismatch { what: "source weights", found, expected: vertex_count });
+        }
+        weights.check_not_negative()?;
+        let inverse_sum = |i| {
+            let sum: f64 = weights.row(i).1.iter().map(|&x| f64::from(x)).sum();
+            if sum > 0.0 { 1.0 / sum } else { 0.0 }
+        };
+        let inverse_sums = (0..vertex_count).map(inverse_sum).collect();
+        Ok(Self { weights, inverse_sums })
+    }
+}
+
+/// Sorts `row[start..]` by bone, merges equal bones, drops zeros and divides by the sum.
+pub(super) fn merge_and_normalise(row: &mut Vec<(u32, f64)>, start: usize) {
+    row[start..].sort_by_key(|&(bone, _)| bone);
+    let mut end = start;
+    let mut sum = 0.0;
+    for at in start..row.len() {
+        let (bone, value) = row[at];
+        sum += value;
+        if end > start && row[end - 1].0 == bone {
+            row[end - 1].1 += value;
+        } else if value > 0.0 {
+            row[end] = (bone, value);
+            end += 1;
+        }
+    }
+    row.truncate(end);
+    for (_, value) in &mut row[start..] {
+        *value /= sum;
+    }
+}

@@ -1,0 +1,67 @@
+//! The one table from the core's errors to Python exceptions, and the one door that frees the GIL.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use skinwright_core::Error;
+
+create_exception!(skinwright_native, SkinwrightError, PyValueError, "Base of every error of this module.");
+create_exception!(skinwright_native, NothingMatched, SkinwrightError, "No target vertex matches the source.");
+create_exception!(skinwright_native, InvalidMesh, SkinwrightError, "A mesh that cannot be used.");
+create_exception!(skinwright_native, InvalidWeights, SkinwrightError, "Weights that cannot be used.");
+create_exception!(
+    skinwright_native,
+    InvalidParameter,
+    SkinwrightError,
+    "A parameter out of range or of the wrong shape."
+);
+create_exception!(skinwright_native, NotSolvable, SkinwrightError, "A system without a reliable solution.");
+create_exception!(skinwright_native, Cancelled, SkinwrightError, "The work was cancelled; nothing was changed.");
+
+/// The table.
+pub fn to_python(error: Error) -> PyErr {
+    let sentence = error.to_string();
+    match error {
+        Error::NothingMatched { .. } => NothingMatched::new_err(sentence),
+        Error::NoTriangles { .. } | Error::PositionNotFinite { .. } | Error::VertexOutOfRange { .. } => {
+            InvalidMesh::new_err(sentence)
+        }
+        Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {
+            InvalidWeights::new_err(sentence)
+        }
+        Error::LengthMismatch { .. } | Error::InvalidParameter { .. } => InvalidParameter::new_err(sentence),
+        Error::NotPositiveDefinite { .. } => NotSolvable::new_err(sentence),
+        Error::Cancelled => Cancelled::new_err(sentence),
+    }
+}
+
+/// What work on the core's side comes to: its own result, or the message of a panic, which is a bug.
+pub type Outcome<T> = Result<skinwright_core::Result<T>, String>;
+
+/// Runs `work` on `threads` threads (0: all of the machine's) and catches panics.
+pub fn run<T: Send>(threads: usize, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> Outcome<T> {
+    let work = || match threads {
+        0 => work(),
+        n => rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads can be started").install(work),
+    };
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+        format!("internal error in Skinwright, please report it: {}", text.unwrap_or("unknown panic"))
+    })
+}
+
+/// Maps an outcome to Python.
+pub fn finish<T>(outcome: Outcome<T>) -> PyResult<T> {
+    outcome.map_err(PyRuntimeError::new_err)?.map_err(to_python)
+}
+
+/// The door: frees the GIL, runs `work`, maps what comes back.
+pub fn enter<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce() -> skinwright_core::Result<T> + Send,
+) -> PyResult<T> {
+    finish(py.detach(|| run(threads, work)))
+}

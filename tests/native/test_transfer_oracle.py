@@ -1,0 +1,71 @@
+"""Raw weights on real garments equal an independent solver's (spec-transfer, section 5)."""
+
+import json
+
+import numpy as np
+import oracle
+import pytest
+import skinwright_native as native
+from glb import data_folder, joined, read_meshes
+
+THETA = np.radians(35)
+GARMENTS = [
+    "mh_female/helper_skirt",
+    "mh_female/female_elegantsuit01",
+    "mh_female/JeansSkirt",
+    "mh_female/Sleeveless",
+    "mh_female/F_Dress_03",
+    "mh_male/male_casualsuit05",
+    "mh_male/male_casualsuit04",
+    "mh_male/male_worksuit01",
+    "mh_male/shoes03",
+    "q_female_peasant/Arms",
+    "q_female_peasant/Body",
+    "q_female_peasant/Legs",
+    "q_male_peasant/Body",
+    "q_male_peasant/Feet",
+    "q_male_peasant/Legs",
+    "qm_women/SciFi/SciFi_Body",
+    "qm_men/Farmer/Farmer_Pants",
+]
+
+
+@pytest.mark.parametrize("case", GARMENTS)
+def test_raw_weights_equal_the_oracle(case):
+    folder = data_folder()
+    entry = next(entry for entry in json.loads((folder / "cases.json").read_text()) if entry["id"] == case)
+    body = joined(read_meshes(folder / entry["body"]))
+    meshes = read_meshes(folder / entry["garment"])
+    garment = next(mesh for mesh in meshes if mesh.name == entry.get("mesh", mesh.name))
+    positions = garment.positions.astype(float)
+    reference = (body.positions.astype(float), body.triangles, body.weights)
+    matching = oracle.match(reference, (positions, garment.triangles))
+
+    weights = native.Weights(body.weights.indptr, body.weights.indices, body.weights.data, body.weights.shape[1])
+    source = native.Source(body.positions, body.triangles, weights)
+    prepared = native.Inpainting(source, garment.positions, garment.triangles)
+    np.testing.assert_allclose(prepared.distance, matching.distance, rtol=1e-5, atol=1e-7)
+
+    rows = matching.rows.tolil()
+    matched = prepared.matched()
+    copied = prepared.solve(mask=np.where(matched, 2, 0)).weights.to_dense()
+    tied = matched & (np.abs(copied - matching.rows.toarray()).max(axis=1) > 1e-6)
+    for i in np.flatnonzero(tied):
+        choices = oracle.tied_rows(reference, positions[i])
+        choice = np.abs(choices - copied[i]).max(axis=1).argmin()
+        assert np.abs(choices[choice] - copied[i]).max() <= 1e-6
+        rows[i] = choices[choice]
+
+    max_distance = 0.05 * np.linalg.norm(np.ptp(positions[np.unique(garment.triangles)], axis=0))
+    distance, angle = matching.distance, matching.angle
+    expected = (distance <= max_distance) & ((angle <= THETA) | (np.pi - angle <= THETA))
+    undecided = tied | (np.abs(distance / max_distance - 1) < 1e-6)
+    undecided |= (np.abs(angle - THETA) < 1e-5) | (np.abs(np.pi - angle - THETA) < 1e-5)
+    assert np.array_equal(matched[~undecided], expected[~undecided])
+    assert undecided.mean() < 0.01
+
+    for length in (0.05 * np.linalg.norm(np.ptp(reference[0], axis=0)), 0.0, 1.0):
+        unknown, raw = oracle.inpaint(positions, garment.triangles, matched, rows.tocsr(), length)
+        vertices, values = prepared.raw_weights(smoothness_length=length, mask=np.where(matched, 2, 0))
+        assert np.array_equal(vertices, unknown)
+        assert len(unknown) == 0 or np.abs(values - raw).max() <= 1e-6

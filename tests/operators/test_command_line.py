@@ -1,0 +1,202 @@
+"""The transfer without a window: exit codes, files, and the same answer as the operator's."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import builders
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+BONES = ["Arm.L", "Arm.R"]
+SCRIPT = Path(__file__).resolve().parents[2] / "blender_scripts" / "transfer_weights.py"
+
+pytestmark = pytest.mark.usefixtures("native", "scene")
+
+
+@pytest.fixture
+def body(scene):
+    obj = builders.body()
+    scene.skinwright.transfer.source = obj
+    return obj
+
+
+@pytest.fixture
+def coat(body):
+    obj = builders.grid("Coat", 9, size=1.8, z=0.02)
+    obj.location.z = 0.1
+    builders.paint(obj, Mask=[0.0] * 10 + [0.5] * 71)
+    obj.skinwright.mask_group = "Mask"
+    builders.select(obj)
+    bpy.context.view_layer.update()
+    return obj
+
+
+@pytest.fixture
+def blend(coat, tmp_path):
+    """The scene in a file of its own; it stays open too."""
+    builders.grid("Belt", 5, size=0.5, z=0.01)
+    path = tmp_path / "in.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    return path
+
+
+def script(*arguments):
+    """Run the script by Python, as where there is no Blender; gives the finished process."""
+    command = [sys.executable, str(SCRIPT), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture
+def transfer(addon):
+    """The command in this process."""
+    return lambda *arguments: addon.command_line.transfer([str(a) for a in arguments])
+
+
+def loaded(path, name):
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.data.objects[name]
+
+
+def test_script_writes_what_the_operator_writes(blend, coat, tmp_path):
+    settings, report, out = (tmp_path / name for name in ("settings.json", "report.json", "out.blend"))
+    settings.write_text(json.dumps({"max_normal_angle": 20, "relative_max_distance": 0.2, "max_influences": 2}))
+    bpy.ops.skinwright.transfer_weights(max_normal_angle=np.radians(20), relative_max_distance=0.2, max_influences=2)
+    expected = builders.dense(coat, BONES)
+    before = blend.read_bytes()
+    done = script(
+        blend, "--source", "Body", "--target", "Coat", "--target", "Belt",
+        "--settings", settings, "--report", report, "--save", out,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Body to Coat, Belt" in done.stdout
+    assert blend.read_bytes() == before
+    content = json.loads(report.read_text())
+    assert content["settings"]["max_normal_angle"] == pytest.approx(20)
+    assert [garment["target"] for garment in content["garments"]] == ["Coat", "Belt"]
+    assert content["garments"][0]["inpainted"] == 10
+    assert builders.dense(loaded(out, "Coat"), BONES) == pytest.approx(expected, abs=1e-6)
+    assert builders.dense(bpy.data.objects["Belt"], BONES).sum(1) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "sentence"),
+    [
+        (["BLEND", "--source", "Nobody", "--target", "Coat"], 1, "there is no object Nobody; there are Belt, Body"),
+        (["gone.blend", "--source", "Body", "--target", "Coat"], 1, "there is no file gone.blend"),
+        (["BLEND", "--source", "Rig", "--target", "Coat"], 1, "Rig is not a mesh"),
+        (["BLEND", "--target", "Coat"], 2, "--source"),
+        (["BLEND", "--source", "Body"], 2, "--target"),
+        ([], 2, "usage"),
+    ],
+)
+def test_script_exit_codes(blend, arguments, code, sentence):
+    done = script(*(str(blend) if argument == "BLEND" else argument for argument in arguments))
+    assert (done.returncode, done.stdout.count("matched")) == (code, 0)
+    assert sentence in done.stderr
+
+
+@pytest.fixture
+def blender(native, tmp_path):
+    """Run a real Blender, the one SKINWRIGHT_BLENDER names or that on the path, with the native module in reach."""
+    executable = os.environ.get("SKINWRIGHT_BLENDER") or shutil.which("blender")
+    if not executable:
+        pytest.skip("there is no Blender: put one on the path or name it by SKINWRIGHT_BLENDER")
+    site = tmp_path / "site"
+    site.mkdir()
+    shutil.copytree(Path(native.__file__).parent, site / "skinwright_native")
+    environment = os.environ | {"PYTHONPATH": str(site), "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    start = [executable, "-b", "--factory-startup", "--python-use-system-env"]
+    return lambda *arguments: subprocess.run(
+        [*start, *map(str, arguments)], capture_output=True, text=True, timeout=120, env=environment
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["--source", "Body", "--target", "Coat"], 0),
+        (["--source", "Body", "--target", "Hat"], 1),
+        (["--source", "Body"], 2),
+    ],
+)
+def test_in_a_real_blender(blender, blend, tmp_path, arguments, code):
+    report = tmp_path / "report.json"
+    done = blender(blend, "-P", SCRIPT, "--", *arguments, "--report", report)
+    assert done.returncode == code, done.stderr
+    assert report.exists() == (code == 0)
+
+
+class TestInThisProcess:
+    """The command the script and `blender -c skinwright transfer` share."""
+
+    def test_done(self, transfer, coat, capsys):
+        assert transfer("--source", "Body", "--target", "Coat") == 0
+        assert "Body to Coat: 71 of 81 vertices matched, 10 inpainted" in capsys.readouterr().out
+        assert builders.dense(coat, BONES).sum(1) == pytest.approx(1, abs=1e-6)
+
+    def test_failing_saves_nothing(self, transfer, coat, tmp_path, capsys):
+        coat.location.z = 50
+        bpy.context.view_layer.update()
+        out, report = tmp_path / "out.blend", tmp_path / "report.json"
+        assert transfer("--source", "Body", "--target", "Coat", "--save", out, "--report", report) == 1
+        assert "skinwright: Coat: " in capsys.readouterr().err
+        assert not out.exists() and not report.exists()
+
+    def test_a_file_that_is_no_blend(self, transfer, tmp_path, capsys):
+        path = tmp_path / "text.blend"
+        path.write_text("not a blend")
+        assert transfer(path, "--source", "Body", "--target", "Coat") == 1
+        assert "cannot be opened" in capsys.readouterr().err
+
+    def test_a_folder_that_is_not_there(self, transfer, coat, tmp_path, capsys):
+        assert transfer("--source", "Body", "--target", "Coat", "--save", tmp_path / "none" / "out.blend") == 1
+        assert "cannot be saved" in capsys.readouterr().err
+        assert transfer("--source", "Body", "--target", "Coat", "--report", tmp_path / "none" / "out.json") == 1
+
+    @pytest.mark.parametrize(
+        ("settings", "sentence"),
+        [
+            ('{"max_distanse": 1}', "no setting max_distanse"),
+            ('{"max_influences": 1.5}', "max_influences cannot be 1.5"),
+            ('{"island_policy": "sink"}', "island_policy cannot be 'sink'"),
+            ('{"match_flipped_normals": 1}', "match_flipped_normals cannot be 1"),
+            ('{"mask": {"group": 3}}', "group cannot be 3"),
+            ("[]", "must be a JSON object"),
+            ("{", "Expecting property name"),
+        ],
+    )
+    def test_bad_settings_are_wrong_usage(self, transfer, coat, tmp_path, capsys, settings, sentence):
+        path = tmp_path / "settings.json"
+        path.write_text(settings)
+        assert transfer("--source", "Body", "--target", "Coat", "--settings", path) == 2
+        assert sentence in capsys.readouterr().err
+        assert len(coat.vertex_groups) == 1
+
+    def test_bad_values_are_refused_by_the_library(self, transfer, coat, tmp_path, capsys):
+        path = tmp_path / "settings.json"
+        path.write_text('{"relative_max_distance": -1}')
+        assert transfer("--source", "Body", "--target", "Coat", "--settings", path) == 1
+        assert "max_distance is -1" in capsys.readouterr().err
+
+    def test_settings_go_through_json_unchanged(self, addon):
+        params = addon.transfer.TransferParams(
+            max_distance=0.25, mask=addon.transfer.Mask("Mask", "PAINTED", invert=True), island_policy="rigid"
+        )
+        again = addon.transfer.from_json(json.loads(json.dumps(addon.transfer.to_json(params))))
+        assert again.max_normal_angle == pytest.approx(params.max_normal_angle)
+        assert again == addon.transfer.from_json(addon.transfer.to_json(again))
+        assert (again.max_distance, again.mask, again.island_policy) == (0.25, params.mask, "rigid")
+
+    def test_main(self, addon, coat, capsys):
+        assert addon.command_line.main(["transfer", "--source", "Body", "--target", "Coat"]) == 0
+        assert addon.command_line.main(["--version"]) == 0
+        assert addon.native.addon_version() in capsys.readouterr().out
+        assert addon.command_line.main(["transfer", "--help"]) == 0
+        assert 'island_policy "bridge"' in " ".join(capsys.readouterr().out.split())
+        assert addon.command_line.main([]) == 2
+        assert addon.command_line.main(["dance"]) == 2

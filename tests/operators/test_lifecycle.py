@@ -1,0 +1,122 @@
+"""Enabling, disabling and enabling again leaves no trace; what is registered keeps Blender's rules."""
+
+from pathlib import Path
+
+import extension
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+
+
+def trace():
+    """Everything an add-on may leave behind."""
+    menus = ("VIEW3D_MT_paint_weight", "VIEW3D_MT_make_links", "MESH_MT_vertex_group_context_menu", "VIEW3D_PT_overlay")
+    return {
+        "types": sorted(set(dir(bpy.types))),
+        "operators": sorted(dir(bpy.ops.skinwright)),
+        "draw": {name: [str(f) for f in getattr(bpy.types, name).draw._draw_funcs] for name in menus if has_draw(name)},
+        "handlers": {
+            name: len(value)
+            for name in dir(bpy.app.handlers)
+            if isinstance(value := getattr(bpy.app.handlers, name), list)
+        },
+        "properties": [
+            sorted(owner.bl_rna.properties.keys())
+            for owner in (bpy.types.Scene, bpy.types.Object, bpy.types.WindowManager, bpy.types.Mesh)
+        ],
+        "presets": bpy.utils.preset_paths("skinwright/transfer_weights"),
+        "preferences": "bl_ext.user_default.skinwright" in bpy.context.preferences.addons,
+    }
+
+
+def has_draw(name):
+    return hasattr(getattr(bpy.types, name, None), "draw") and hasattr(getattr(bpy.types, name).draw, "_draw_funcs")
+
+
+def test_enabling_and_disabling_leaves_no_trace(addon):
+    extension.disable()
+    before = trace()
+    for _ in range(3):
+        extension.enable()
+        assert trace() != before
+        extension.disable()
+        assert trace() == before
+    extension.enable()
+
+
+@pytest.mark.parametrize("menu", ["VIEW3D_MT_paint_weight", "VIEW3D_MT_make_links"])
+def test_menu_entries(addon, menu):
+    drawn = getattr(bpy.types, menu).draw._draw_funcs
+    assert [f.__module__ for f in drawn].count(f"{addon.__name__}.ui.menus") == 1
+
+
+def test_the_command_is_taken_away(addon, monkeypatch):
+    """Blender has no list of commands to look into: see what is asked of it."""
+    taken_away = []
+    monkeypatch.setattr(bpy.utils, "register_cli_command", lambda name, function: (name, function))
+    monkeypatch.setattr(bpy.utils, "unregister_cli_command", taken_away.append)
+    addon.command_line.register()
+    addon.command_line.unregister()
+    assert taken_away == [("skinwright", addon.command_line.main)]
+
+
+def skinwright_operators():
+    return [getattr(bpy.ops.skinwright, name).get_rna_type() for name in dir(bpy.ops.skinwright)]
+
+
+def test_names_and_descriptions(addon):
+    """Every operator and property says what it is, in a sentence without a full stop."""
+    operators = skinwright_operators()
+    for rna in operators:
+        assert rna.name and rna.description and not rna.description.endswith("."), rna.identifier
+    for rna in [*operators, *(cls.bl_rna for cls in addon.properties.CLASSES[:2])]:
+        for prop in rna.properties:
+            if prop.identifier in ("rna_type", "name") or rna.identifier.endswith("preset_add"):
+                continue
+            assert prop.name and prop.description and not prop.description.endswith("."), prop.identifier
+
+
+def test_panel_and_operator_have_the_same_settings(addon):
+    operator = bpy.ops.skinwright.transfer_weights.get_rna_type().properties
+    panel = bpy.context.scene.skinwright.transfer.bl_rna.properties
+    for name in addon.properties.TransferOptions.__annotations__:
+        pair = operator[name], panel[name]
+        assert len({prop.type for prop in pair}) == len({prop.description for prop in pair}) == 1
+        assert pair[0].default == pair[1].default
+
+
+def test_defaults_are_the_librarys(addon, scene):
+    """A fresh panel and a call without settings ask for the same."""
+    assert scene.skinwright.transfer.to_params() == addon.transfer.TransferParams(
+        max_normal_angle=pytest.approx(addon.transfer.TransferParams().max_normal_angle),
+        relative_max_distance=pytest.approx(0.05),
+        relative_smoothness_length=pytest.approx(0.05),
+        smoothing_factor=pytest.approx(0.2),
+    )
+
+
+def test_shipped_presets_set_what_they_say(addon, scene):
+    """Each preset sets the same settings, so that changing presets leaves nothing of the last one."""
+    (folder,) = map(Path, bpy.utils.preset_paths("skinwright/transfer_weights"))
+    presets = sorted(folder.glob("*.py"))
+    assert len(presets) == 5
+    seen = set()
+    for preset in presets:
+        names = tuple(line.split("=")[0] for line in preset.read_text().splitlines() if line.startswith("settings."))
+        bpy.ops.script.execute_preset(filepath=str(preset), menu_idname="SKINWRIGHT_PT_transfer_presets")
+        seen.add((names, scene.skinwright.transfer.to_params()))
+    assert len(seen) == 5 and len({names for names, _ in seen}) == 1
+
+
+def test_saving_and_removing_a_preset(addon, scene):
+    scene.skinwright.transfer.max_influences = 4
+    bpy.ops.skinwright.transfer_preset_add(name="Mine")
+    files = [
+        path for folder in bpy.utils.preset_paths("skinwright/transfer_weights") for path in Path(folder).iterdir()
+    ]
+    (mine,) = (path for path in files if path.stem == "Mine")
+    scene.skinwright.transfer.max_influences = 0
+    bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="SKINWRIGHT_PT_transfer_presets")
+    assert scene.skinwright.transfer.max_influences == 4
+    bpy.ops.skinwright.transfer_preset_add(name="Mine", remove_name=True)
+    assert not mine.exists()

@@ -1,0 +1,157 @@
+"""The rules of the house that no compiler checks: directions of import, versions, packaging."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+ADDON = ROOT / "addon" / "skinwright"
+MODULES = sorted(p.relative_to(ADDON) for p in ADDON.rglob("*.py") if "presets" not in p.relative_to(ADDON).parts)
+
+# What each part may import from the rest of the add-on. `csr` is numpy only and open to all.
+MAY_IMPORT = {
+    "csr": set(),
+    "native": {"csr"},
+    "reporting": {"csr"},
+    "scene": {"csr", "scene"},
+    "jobs": {"csr", "native"},
+    "transfer": {"csr", "jobs", "native", "reporting", "scene", "transfer"},
+    "match_session": {"csr", "jobs", "native", "scene", "transfer"},
+    "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
+    "preview": {"csr", "match_session", "scene", "transfer"},
+    "weight_check": {"csr", "scene"},
+    "sculpt_session": {"csr", "native", "reporting", "scene"},
+    "properties": {"transfer"},
+    "preferences": {"native"},
+    "operators": {
+        "csr",
+        "jobs",
+        "mask_painting",
+        "match_session",
+        "native",
+        "operators",
+        "preferences",
+        "properties",
+        "reporting",
+        "scene",
+        "sculpt_session",
+        "transfer",
+        "weight_check",
+    },
+    "ui": {"jobs", "match_session", "native", "preview", "properties", "ui"},
+    "command_line": {"native", "reporting", "scene", "transfer"},
+    "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
+}
+MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}
+MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview", "weight_check"}
+MAY_SEE_THE_WHEEL = {"native"}
+
+
+def toml(name):
+    return tomllib.loads((ROOT / name).read_text())
+
+
+def part(module):
+    return module.parts[0].removesuffix(".py")
+
+
+def imports(module):
+    """(level, name) of every import in a module; the names after `from . import` one by one."""
+    for node in ast.walk(ast.parse((ADDON / module).read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((0, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.level, node.module
+        elif isinstance(node, ast.ImportFrom):
+            yield from ((node.level, alias.name) for alias in node.names)
+
+
+def imported_part(module, level, name):
+    """The part of the add-on a relative import leads to."""
+    package = module.parent.parts[: len(module.parent.parts) - (level - 1)]
+    return (*package, *name.split("."))[0]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_imports_point_one_way(module):
+    for level, name in imports(module):
+        top = name.split(".")[0]
+        if level:
+            target = imported_part(module, level, name)
+            assert target in MAY_IMPORT[part(module)], f"{module} imports {target}"
+        assert top != "skinwright", f"{module} must import relatively"
+        assert not (top in ("bpy", "bmesh", "gpu", "bl_ui") and part(module) not in MAY_SEE_BPY), f"{module} sees {top}"
+        assert not (top == "skinwright_native" and part(module) not in MAY_SEE_THE_WHEEL), f"{module} sees the wheel"
+
+
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_no_side_effects_at_import(module):
+    """At the top of a module stand definitions, constants and imports, never a bare call."""
+    for node in ast.parse((ADDON / module).read_text()).body:
+        bare = isinstance(node, ast.Expr) and not isinstance(node.value, ast.Constant)
+        assert not bare, f"{module}:{node.lineno} runs at import"
+
+
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_no_module_of_odds_and_ends(module):
+    assert not {"utils", "helpers", "manager", "data", "common", "misc"} & {p.removesuffix(".py") for p in module.parts}
+
+
+@pytest.mark.parametrize("module", MODULES, ids=str)
+def test_functions_stay_short(module):
+    for node in ast.walk(ast.parse((ADDON / module).read_text())):
+        if isinstance(node, ast.FunctionDef):
+            length = node.end_lineno - node.lineno + 1
+            assert length <= 60, f"{module}: {node.name} has {length} lines"
+
+
+def test_versions_are_equal():
+    version = toml("Cargo.toml")["workspace"]["package"]["version"]
+    assert toml("addon/skinwright/blender_manifest.toml")["version"] == version
+    for crate in ("core", "native"):
+        assert toml(f"rust/{crate}/Cargo.toml")["package"]["version"] == {"workspace": True}
+    assert toml("pyproject.toml")["project"].get("version", version) == version
+    locked = {package["name"]: package["version"] for package in toml("Cargo.lock")["package"]}
+    assert locked["skinwright-core"] == locked["skinwright-native"] == version
+
+
+def test_the_changelog_knows_the_version():
+    changelog = ROOT / "CHANGELOG.md"
+    if not changelog.exists():
+        pytest.skip("there is no CHANGELOG.md yet")
+    version = toml("Cargo.toml")["workspace"]["package"]["version"]
+    assert re.search(rf"^## .*({re.escape(version)}|[Uu]nreleased)", changelog.read_text(), re.MULTILINE)
+
+
+def test_one_glam():
+    assert [package["name"] for package in toml("Cargo.lock")["package"]].count("glam") == 1
+
+
+def test_core_is_pure():
+    dependencies = set(toml("rust/core/Cargo.toml")["dependencies"])
+    assert not dependencies & {"pyo3", "numpy"}
+    assert "#![forbid(unsafe_code)]" in (ROOT / "rust" / "core" / "src" / "lib.rs").read_text()
+
+
+def test_the_manifest_is_valid():
+    """By Blender's own command for extensions, which needs no Blender."""
+    bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+    scripts = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
+    (command,) = scripts.rglob("bl_pkg/cli/blender_ext.py")
+    done = subprocess.run(
+        [sys.executable, str(command), "validate", str(ADDON)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_manifest_asks_for_nothing_but_files():
+    manifest = toml("addon/skinwright/blender_manifest.toml")
+    assert manifest["id"] == ADDON.name
+    assert set(manifest["permissions"]) == {"files"}
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert manifest["blender_version_min"] == "4.2.0"
