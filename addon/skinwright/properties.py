@@ -2,7 +2,7 @@
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
-from bpy.types import Object, PropertyGroup, Scene
+from bpy.types import Object, PropertyGroup, Scene, UILayout
 
 from .transfer.params import Mask, TransferParams
 
@@ -13,7 +13,7 @@ LENGTH_MODES = [
 
 
 class TransferOptions:
-    """The settings of a transfer; a mix-in, as Blender takes properties from base classes too."""
+    """The settings of a transfer and their layout; a mix-in, as Blender takes properties from base classes too."""
 
     groups: EnumProperty(
         name="Groups",
@@ -61,7 +61,7 @@ class TransferOptions:
         subtype="ANGLE",
     )
     match_flipped_normals: BoolProperty(
-        name="Match Flipped Normals",
+        name="Flipped Normals",
         description="Match surfaces that face the other way too, as linings do",
         default=True,
     )
@@ -127,12 +127,12 @@ class TransferOptions:
         subtype="FACTOR",
     )
     selected_only: BoolProperty(
-        name="Selected Vertices Only",
+        name="Selected Vertices",
         description="Write only the vertices selected in Edit mode or by the paint mask",
         default=False,
     )
     add_armature: BoolProperty(
-        name="Add Armature Modifier",
+        name="Add Armature",
         description="Let the source's armature deform targets that have none",
         default=True,
     )
@@ -141,6 +141,35 @@ class TransferOptions:
         description="Give a target a mesh of its own where others share it, so that theirs keeps its weights",
         default=False,
     )
+
+    def draw_matching(self, layout: UILayout) -> None:
+        """Shapes and thresholds."""
+        layout.prop(self, "geometry")
+        self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
+        layout.prop(self, "max_normal_angle")
+        layout.prop(self, "match_flipped_normals")
+
+    def draw_inpainting(self, layout: UILayout) -> None:
+        """The solve, loose parts, smoothing."""
+        self._draw_length(layout, "smoothness_mode", "relative_smoothness_length", "smoothness_length")
+        layout.prop(self, "island_policy")
+        layout.prop(self, "smoothing_iterations")
+        column = layout.column()
+        column.active = self.smoothing_iterations > 0
+        column.prop(self, "smoothing_factor", text="Factor")
+
+    def draw_writing(self, layout: UILayout) -> None:
+        """Limit, mix, and what else may change."""
+        layout.prop(self, "max_influences")
+        layout.prop(self, "mix_factor")
+        layout.prop(self, "selected_only")
+        layout.prop(self, "add_armature")
+        layout.prop(self, "make_single_user")
+
+    def _draw_length(self, layout: UILayout, mode: str, relative: str, absolute: str) -> None:
+        row = layout.row(align=True)
+        row.prop(self, relative if getattr(self, mode) == "RELATIVE" else absolute)
+        row.prop(self, mode, text="")
 
     def to_params(self, threads: int = 0) -> TransferParams:
         """As plain values; Blender's angles are radians already."""
@@ -197,13 +226,42 @@ class SKINWRIGHT_PG_object(PropertyGroup):
         return Mask(self.mask_group, self.mask_reading, self.mask_threshold, self.mask_invert)
 
 
+class SKINWRIGHT_PG_overlay(PropertyGroup):
+    """What is drawn over a mesh."""
+
+    kind: EnumProperty(
+        name="Overlay",
+        description="What the colours over the mesh show",
+        items=[
+            ("NONE", "None", "Draw nothing"),
+            ("MATCH", "Match", "Which vertices match, which are inpainted, which the mask decides"),
+            ("INFLUENCES", "Influences", "How many bones each vertex of the active mesh follows"),
+            ("STRETCH", "Stretch", "Where the pose stretches or presses the edges of the active mesh"),
+        ],
+    )
+    opacity: FloatProperty(
+        name="Opacity",
+        description="How far the colours hide what is below",
+        default=0.9,
+        min=0.1,
+        max=1,
+        subtype="FACTOR",
+    )
+    live: BoolProperty(
+        name="Live Weights",
+        description="While the mask is painted, solve and write the weights after every stroke",
+        default=True,
+    )
+
+
 class SKINWRIGHT_PG_scene(PropertyGroup):
     """All of Skinwright's settings in a scene, one group a feature."""
 
     transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
+    overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
 
 
-CLASSES = (SKINWRIGHT_PG_transfer, SKINWRIGHT_PG_object, SKINWRIGHT_PG_scene)
+CLASSES = (SKINWRIGHT_PG_transfer, SKINWRIGHT_PG_object, SKINWRIGHT_PG_overlay, SKINWRIGHT_PG_scene)
 
 
 def register() -> None:

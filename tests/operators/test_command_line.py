@@ -1,6 +1,8 @@
 """The transfer without a window: exit codes, files, and the same answer as the operator's."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -98,6 +100,37 @@ def test_script_exit_codes(blend, arguments, code, sentence):
     assert sentence in done.stderr
 
 
+@pytest.fixture
+def blender(native, tmp_path):
+    """Run a real Blender, the one SKINWRIGHT_BLENDER names or that on the path, with the native module in reach."""
+    executable = os.environ.get("SKINWRIGHT_BLENDER") or shutil.which("blender")
+    if not executable:
+        pytest.skip("there is no Blender: put one on the path or name it by SKINWRIGHT_BLENDER")
+    site = tmp_path / "site"
+    site.mkdir()
+    shutil.copytree(Path(native.__file__).parent, site / "skinwright_native")
+    environment = os.environ | {"PYTHONPATH": str(site), "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    start = [executable, "-b", "--factory-startup", "--python-use-system-env"]
+    return lambda *arguments: subprocess.run(
+        [*start, *map(str, arguments)], capture_output=True, text=True, timeout=120, env=environment
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["--source", "Body", "--target", "Coat"], 0),
+        (["--source", "Body", "--target", "Hat"], 1),
+        (["--source", "Body"], 2),
+    ],
+)
+def test_in_a_real_blender(blender, blend, tmp_path, arguments, code):
+    report = tmp_path / "report.json"
+    done = blender(blend, "-P", SCRIPT, "--", *arguments, "--report", report)
+    assert done.returncode == code, done.stderr
+    assert report.exists() == (code == 0)
+
+
 class TestInThisProcess:
     """The command the script and `blender -c skinwright transfer` share."""
 
@@ -163,5 +196,7 @@ class TestInThisProcess:
         assert addon.command_line.main(["transfer", "--source", "Body", "--target", "Coat"]) == 0
         assert addon.command_line.main(["--version"]) == 0
         assert addon.native.addon_version() in capsys.readouterr().out
+        assert addon.command_line.main(["transfer", "--help"]) == 0
+        assert 'island_policy "bridge"' in " ".join(capsys.readouterr().out.split())
         assert addon.command_line.main([]) == 2
         assert addon.command_line.main(["dance"]) == 2

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import conftest
+import extension
 import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
@@ -34,14 +34,20 @@ def has_draw(name):
 
 
 def test_enabling_and_disabling_leaves_no_trace(addon):
-    conftest.disable()
+    extension.disable()
     before = trace()
     for _ in range(3):
-        conftest.enable()
+        extension.enable()
         assert trace() != before
-        conftest.disable()
+        extension.disable()
         assert trace() == before
-    conftest.enable()
+    extension.enable()
+
+
+@pytest.mark.parametrize("menu", ["VIEW3D_MT_paint_weight", "VIEW3D_MT_make_links"])
+def test_menu_entries(addon, menu):
+    drawn = getattr(bpy.types, menu).draw._draw_funcs
+    assert [f.__module__ for f in drawn].count(f"{addon.__name__}.ui.menus") == 1
 
 
 def test_the_command_is_taken_away(addon, monkeypatch):

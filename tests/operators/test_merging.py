@@ -50,7 +50,10 @@ def merged_one_vertex(new, old, locked, factor, limit):
     remainder = max(1 - old[locked].sum(), 0)
     row = np.where(locked, 0, new)
     row = row / row.sum() * remainder if row.sum() else row
-    if factor < 1:
+    if not row.any():
+        row = np.where(locked, 0, old)
+        row = row / row.sum() * remainder if row.sum() else row
+    elif factor < 1:
         row = factor * row + (1 - factor) * np.where(locked, 0, old)
         row = row / row.sum() * remainder if row.sum() else row
     if limit:

@@ -205,6 +205,20 @@ class TestTarget:
             plain(body, curve)
 
 
+@pytest.mark.parametrize("flaw", [float("nan"), -0.5, 0.5])
+def test_an_answer_that_is_no_set_of_weights_is_not_written(addon, body, coat, monkeypatch, flaw):
+    real = addon.native.Job.result
+
+    def flawed(*arguments, **keywords):
+        transfer, rows = real(*arguments, **keywords)
+        values = rows.values.copy()
+        values[rows.indptr[7]] += flaw
+        return transfer, rows._replace(values=values)
+
+    monkeypatch.setattr(addon.native.Job, "result", flawed)
+    refused("Coat: the answer is no set of weights", coat)
+
+
 class TestLinked:
     """Data of other files: a linked body may give, a linked garment cannot take."""
 
@@ -295,7 +309,11 @@ class TestWarnings:
         parent.scale.x = 2
         coat.parent, coat.rotation_euler.z = parent, 0.5
         bpy.context.view_layer.update()
-        assert "Coat sheared" in self.warnings(plain(body, coat))
+        assert "shears Coat" in self.warnings(plain(body, coat))
+
+    def test_mirroring_without_vertex_groups(self, plain, body, coat):
+        coat.modifiers.new("Mirror", "MIRROR").use_mirror_vertex_groups = False
+        assert "Vertex Groups is off in the modifier Mirror of Coat" in self.warnings(plain(body, coat))
 
     def test_unnormalised_source(self, plain, body, coat):
         body.vertex_groups["Arm.L"].add([0, 1], 0.5, "ADD")

@@ -14,16 +14,17 @@ def merge(transferred: Rows, before: Rows, *, locked: NDArray[np.bool_], factor:
     """Rows over the unlocked columns: `factor` of the transferred and the rest of the old weights.
 
     `transferred` and `before` share their columns; `locked` (B,) marks those held fixed. A row sums to what the locked
-    weights leave of 1 and, with them, has at most `max_influences` entries (0: no limit). An empty transferred row
-    stays empty: that vertex is not to be written.
+    weights leave of 1 and, with them, has at most `max_influences` entries (0: no limit). Where only locked bones are
+    transferred, the old weights fill the rest. An empty transferred row stays empty: that vertex is not to be written.
     """
     held = csr.keep_columns(before, locked)
     remainder = np.clip(1 - csr.row_sums(held), 0, None)
     remainder[remainder < SUM_TOLERANCE] = 0
     rows = _scaled(csr.keep_columns(transferred, ~locked), remainder)
-    if factor < 1:
-        written = np.diff(transferred.indptr) > 0
-        rows = _scaled(_mixed(rows, csr.keep_columns(before, ~locked), factor, written), remainder)
+    new_share = np.where(csr.row_sums(rows) > 0, factor, 0.0)
+    old_share = np.where(np.diff(transferred.indptr) > 0, 1 - new_share, 0.0)
+    if old_share.any():
+        rows = _scaled(_mixed(rows, csr.keep_columns(before, ~locked), new_share, old_share), remainder)
     if max_influences:
         members = np.bincount(csr.entry_vertices(held)[held.values > 0], minlength=len(remainder))
         rows = _scaled(csr.keep_largest(rows, np.maximum(max_influences - members, 0)), remainder)
@@ -34,7 +35,8 @@ def mix(transferred: Rows, before: Rows, factor: float) -> Rows:
     """`factor` of the transferred and the rest of the old weights, column by column, no row normalised."""
     if factor == 1:
         return transferred
-    return _mixed(transferred, before, factor, np.ones(len(before.indptr) - 1, bool))
+    every = np.ones(len(before.indptr) - 1)
+    return _mixed(transferred, before, factor * every, (1 - factor) * every)
 
 
 def overfull(before: Rows, locked: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -42,14 +44,14 @@ def overfull(before: Rows, locked: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.flatnonzero(csr.row_sums(csr.keep_columns(before, locked)) > 1 + SUM_TOLERANCE)
 
 
-def _mixed(rows: Rows, before: Rows, factor: float, written: NDArray[np.bool_]) -> Rows:
+def _mixed(rows: Rows, before: Rows, new_share: NDArray[np.float64], old_share: NDArray[np.float64]) -> Rows:
+    """Each row times its share, added up."""
     old, new = csr.entry_vertices(before), csr.entry_vertices(rows)
-    keep = written[old]
     return csr.from_entries(
-        np.concatenate([old[keep], new]),
-        np.concatenate([before.bones[keep], rows.bones]),
-        np.concatenate([(1 - factor) * before.values[keep], factor * rows.values]),
-        len(written),
+        np.concatenate([old, new]),
+        np.concatenate([before.bones, rows.bones]),
+        np.concatenate([old_share[old] * before.values, new_share[new] * rows.values]),
+        len(new_share),
     )
 
 

@@ -6,15 +6,12 @@
 use rayon::prelude::*;
 
 use super::Source;
-use crate::adjacency::{DisjointSets, NONE};
+use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
 use crate::linear_solve::{Cholesky, SymmetricMatrix};
 use crate::mesh::TriMesh;
 use crate::surface::SurfacePoint;
-
-/// Rows a worker assembles at a time.
-const ROWS_A_RUN: usize = 1024;
 
 /// Backward error above which a solution is refined once, and above which it is refused.
 const REFINE_ABOVE: f64 = 1e-14;
@@ -30,16 +27,6 @@ pub struct Block {
     factor: Cholesky,
 }
 
-/// Q_UI of a block: for each unknown, its matched two-ring. `vertices` are the distinct matched vertices, and `columns`
-/// index into them.
-#[derive(Debug, Default)]
-struct Boundary {
-    vertices: Vec<u32>,
-    starts: Vec<usize>,
-    columns: Vec<u32>,
-    values: Vec<f64>,
-}
-
 /// Raw weights of a block's unknowns: `values` is (unknowns, bones), row-major, before any clamping.
 #[derive(Debug)]
 pub struct BlockWeights {
@@ -49,38 +36,6 @@ pub struct BlockWeights {
     pub values: Vec<f64>,
     /// Backward error of the solve (see [`Block::solve`]).
     pub residual: f64,
-}
-
-/// Finds the independent blocks among `unknown` vertices (V): connected components of the two-ring graph, or of the
-/// one-ring graph where `smoothness_length` is 0. Each ascending, ordered by first vertex.
-pub fn independent_blocks(laplacian: &Laplacian, unknown: &[bool], smoothness_length: f64) -> Vec<Vec<u32>> {
-    let mut sets = DisjointSets::new(unknown.len());
-    for i in 0..unknown.len() {
-        if smoothness_length == 0.0 && !unknown[i] {
-            continue;
-        }
-        let mut first = if unknown[i] { Some(i as u32) } else { None };
-        for &j in laplacian.neighbours(i).iter().filter(|&&j| unknown[j as usize]) {
-            sets.union(*first.get_or_insert(j), j);
-        }
-    }
-    let (block_of, count) = sets.number(|i| unknown[i as usize]);
-    let mut blocks = vec![Vec::new(); count];
-    for (i, &block) in block_of.iter().enumerate().filter(|&(_, &block)| block != NONE) {
-        blocks[block as usize].push(i as u32);
-    }
-    blocks
-}
-
-/// Position of every unknown within its block (V), [`NONE`] for the other vertices.
-pub fn number_unknowns(blocks: &[Vec<u32>], vertex_count: usize) -> Vec<u32> {
-    let mut number = vec![NONE; vertex_count];
-    for block in blocks {
-        for (k, &i) in block.iter().enumerate() {
-            number[i as usize] = k as u32;
-        }
-    }
-    number
 }
 
 impl Block {
@@ -95,9 +50,7 @@ impl Block {
         number: &[u32],
         smoothness_length: f64,
     ) -> Result<Self> {
-        let assemble = |run: &[u32]| Rows::assemble(laplacian, run, number, smoothness_length);
-        let parts: Vec<Rows> = unknowns.par_chunks(ROWS_A_RUN).map(assemble).collect();
-        let (matrix, boundary) = Rows::concatenate(parts);
+        let (matrix, boundary) = system::assemble(laplacian, &unknowns, number, smoothness_length);
         let positions: Vec<_> = unknowns.iter().map(|&i| mesh.positions()[i as usize].into()).collect();
         let factor = Cholesky::factor(&matrix, &positions)
             .map_err(|e| Error::NotPositiveDefinite { vertex: unknowns[e.unknown] as usize })?;
@@ -219,96 +172,4 @@ fn blended(source: &Source, point: &SurfacePoint) -> Vec<(u32, f64)> {
     let mut row = Vec::new();
     source.blend(point, &mut row);
     row
-}
-
-/// Assembled rows of Q of a run of unknowns: the lower triangle of Q_UU, read as columns of it, and Q_UI with
-/// vertices in place of columns.
-#[derive(Default)]
-struct Rows {
-    unknown_ends: Vec<usize>,
-    unknown_rows: Vec<u32>,
-    unknown_values: Vec<f64>,
-    known_ends: Vec<usize>,
-    known_vertices: Vec<u32>,
-    known_values: Vec<f64>,
-}
-
-impl Rows {
-    fn assemble(laplacian: &Laplacian, unknowns: &[u32], number: &[u32], smoothness_length: f64) -> Self {
-        let mut rows = Self::default();
-        let mut entries = Vec::new();
-        for &u in unknowns {
-            row_of_q(laplacian, u, smoothness_length, &mut entries);
-            for &(v, value) in &entries {
-                let k = number[v as usize];
-                if k == NONE {
-                    rows.known_vertices.push(v);
-                    rows.known_values.push(value);
-                } else if v >= u {
-                    rows.unknown_rows.push(k);
-                    rows.unknown_values.push(value);
-                }
-            }
-            rows.unknown_ends.push(rows.unknown_rows.len());
-            rows.known_ends.push(rows.known_vertices.len());
-        }
-        rows
-    }
-
-    fn concatenate(parts: Vec<Self>) -> (SymmetricMatrix, Boundary) {
-        let mut matrix = SymmetricMatrix { column_starts: vec![0], ..SymmetricMatrix::default() };
-        let mut boundary = Boundary { starts: vec![0], ..Boundary::default() };
-        for part in parts {
-            let (unknown_offset, known_offset) = (matrix.rows.len(), boundary.columns.len());
-            matrix.column_starts.extend(part.unknown_ends.iter().map(|end| unknown_offset + end));
-            matrix.rows.extend(part.unknown_rows);
-            matrix.values.extend(part.unknown_values);
-            boundary.starts.extend(part.known_ends.iter().map(|end| known_offset + end));
-            boundary.columns.extend(part.known_vertices);
-            boundary.values.extend(part.known_values);
-        }
-        boundary.number_columns();
-        (matrix, boundary)
-    }
-}
-
-impl Boundary {
-    /// Turns vertices in `columns` into indices of the distinct ones.
-    fn number_columns(&mut self) {
-        self.vertices.clone_from(&self.columns);
-        self.vertices.sort_unstable();
-        self.vertices.dedup();
-        let vertices = &self.vertices;
-        self.columns.par_iter_mut().with_min_len(4096).for_each(|column| {
-            *column = vertices.binary_search(column).expect("collected from the same list") as u32;
-        });
-    }
-}
-
-/// Row u of Q = S + l^2 S M^-1 S over the structural two-ring (one-ring where l is 0), ascending.
-fn row_of_q(laplacian: &Laplacian, u: u32, smoothness_length: f64, entries: &mut Vec<(u32, f64)>) {
-    entries.clear();
-    push_row_of_s(laplacian, u, 1.0, entries);
-    if smoothness_length > 0.0 {
-        let one_ring = entries.len();
-        for at in 0..one_ring {
-            let (a, s_ua) = entries[at];
-            let scale = smoothness_length * smoothness_length * s_ua / laplacian.mass()[a as usize];
-            push_row_of_s(laplacian, a, scale, entries);
-        }
-    }
-    entries.sort_by_key(|&(v, _)| v);
-    entries.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
-        if same {
-            kept.1 += next.1;
-        }
-        same
-    });
-}
-
-fn push_row_of_s(laplacian: &Laplacian, i: u32, scale: f64, entries: &mut Vec<(u32, f64)>) {
-    let (neighbours, cotangents) = laplacian.row(i as usize);
-    entries.push((i, scale * laplacian.diagonal()[i as usize]));
-    entries.extend(std::iter::zip(neighbours, cotangents).map(|(&j, &cotangent)| (j, -scale * cotangent)));
 }

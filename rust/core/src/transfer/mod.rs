@@ -9,9 +9,11 @@ pub mod islands;
 pub mod limit;
 pub mod matching;
 mod prepared;
+mod problem;
 mod report;
 pub mod smooth;
 mod source;
+pub mod system;
 
 pub use islands::{IslandPolicy, UnmatchedIsland};
 pub use matching::{Criteria, MaskValue};

@@ -1,13 +1,15 @@
+from math import radians
+
 import bpy
 
 settings = bpy.context.scene.skinwright.transfer
 
 settings.distance_mode = "RELATIVE"
 settings.relative_max_distance = 0.05
-settings.max_normal_angle = 0.523599
-settings.match_flipped_normals = False
+settings.max_normal_angle = radians(45)
+settings.match_flipped_normals = True
 settings.smoothness_mode = "RELATIVE"
-settings.relative_smoothness_length = 0.05
+settings.relative_smoothness_length = 0.1
 settings.island_policy = "BRIDGE"
-settings.smoothing_iterations = 2
+settings.smoothing_iterations = 0
 settings.smoothing_factor = 0.2

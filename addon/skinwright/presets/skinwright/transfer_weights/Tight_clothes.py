@@ -1,10 +1,12 @@
+from math import radians
+
 import bpy
 
 settings = bpy.context.scene.skinwright.transfer
 
 settings.distance_mode = "RELATIVE"
 settings.relative_max_distance = 0.05
-settings.max_normal_angle = 0.785398
+settings.max_normal_angle = radians(45)
 settings.match_flipped_normals = True
 settings.smoothness_mode = "RELATIVE"
 settings.relative_smoothness_length = 0.05

@@ -1,0 +1,84 @@
+//! The stages of a transfer on a garment of 100,000 vertices, 40 % of them unmatched in a few blobs.
+
+#[path = "../tests/common/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
+mod common;
+
+use common::{Fixture, body, tube};
+use divan::Bencher;
+use skinwright_core::adjacency::{Islands, clean_triangles};
+use skinwright_core::laplacian::Laplacian;
+use skinwright_core::transfer::system::{assemble, independent_blocks, number_unknowns};
+use skinwright_core::transfer::{Inpainting, Settings, Source};
+use skinwright_core::{Progress, TriMesh, Weights};
+
+fn main() {
+    divan::main();
+}
+
+/// 500 x 200 vertices; every third of the way round it stands off the body.
+fn garment() -> Fixture {
+    tube(500, 200).mapped(|p| {
+        let stands_off = (3.0 * p.y.atan2(p.x)).sin() > 0.3;
+        let out = if stands_off { 1.6 } else { 1.01 };
+        glam::DVec3::new(p.x * out, p.y * out, p.z)
+    })
+}
+
+fn source() -> Source {
+    let (body, rows) = body();
+    let mut indptr = vec![0];
+    rows.iter().for_each(|(bones, _)| indptr.push(indptr[indptr.len() - 1] + bones.len() as u32));
+    let (bones, values) = rows.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
+    let weights = Weights::new(indptr, bones.concat(), values.concat(), 4).unwrap();
+    Source::new(&body.positions, body.triangles, weights).unwrap()
+}
+
+#[divan::bench]
+fn laplacian(bencher: Bencher) {
+    let garment = garment();
+    let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
+    bencher.bench_local(|| {
+        let (clean, around) = clean_triangles(&garment.triangles, garment.positions.len());
+        let islands = Islands::new(&clean, garment.positions.len());
+        Laplacian::new(&mesh, &clean, &around, &islands)
+    });
+}
+
+#[divan::bench]
+fn blocks_and_assembly(bencher: Bencher) {
+    let garment = garment();
+    let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
+    let (clean, around) = clean_triangles(&garment.triangles, garment.positions.len());
+    let islands = Islands::new(&clean, garment.positions.len());
+    let laplacian = Laplacian::new(&mesh, &clean, &around, &islands);
+    let progress = Progress::default();
+    let prepared = Inpainting::new(source(), garment.positions.clone(), garment.triangles.clone(), &progress).unwrap();
+    let matched = prepared.matched(None, &Settings::default()).unwrap();
+    let unknown: Vec<bool> = matched.iter().map(|m| !m).collect();
+    bencher.bench_local(|| {
+        let blocks = independent_blocks(&laplacian, &unknown, 0.1);
+        let number = number_unknowns(&blocks, garment.positions.len());
+        blocks.iter().map(|unknowns| assemble(&laplacian, unknowns, &number, 0.1)).collect::<Vec<_>>()
+    });
+}
+
+#[divan::bench(args = [0, 10])]
+fn solve_kept(bencher: Bencher, smoothing_iterations: u32) {
+    let garment = garment();
+    let progress = Progress::default();
+    let mut prepared = Inpainting::new(source(), garment.positions, garment.triangles, &progress).unwrap();
+    let settings = Settings { smoothing_iterations, ..Settings::default() };
+    prepared.solve(None, &settings, &progress).unwrap();
+    bencher.bench_local(move || prepared.solve(None, &settings, &progress).unwrap());
+}
+
+#[divan::bench]
+fn all(bencher: Bencher) {
+    let (garment, source, progress) = (garment(), source(), Progress::default());
+    bencher.bench_local(|| {
+        let arrays = (garment.positions.clone(), garment.triangles.clone());
+        let mut prepared = Inpainting::new(source.clone(), arrays.0, arrays.1, &progress).unwrap();
+        prepared.solve(None, &Settings::default(), &progress).unwrap()
+    });
+}
