@@ -39,6 +39,10 @@ RATIOS: dict[str, tuple[Seconds, Seconds]] = {
         lambda f: f["skinwright smoothed"]["wall"],
     ),
     "order + factor + solve of one component, 60 bones, against CHOLMOD's better ordering": (best_cholmod, own_solve),
+    "Blender's Data Transfer against the add-on inside Blender": (
+        lambda f: f["blender data transfer"]["wall"],
+        lambda f: f["blender add-on"]["wall"],
+    ),
     "hierarchy + closest points, against libigl's AABB tree": (
         lambda f: f["libigl closest points"]["wall"],
         lambda f: f["skinwright closest points"]["wall"],
@@ -96,8 +100,9 @@ def _report(figures: Figures, vertices: dict[str, int], plans: dict, load: float
             difference = "" if entry["difference"] is None else f"{entry['difference']:.1e}"
             timing = (f"{entry['wall']:.3f}", f"{entry['cpu']:.3f}", f"{entry['peak_mb']:.0f}")
             lines.append(_row(method, *timing, difference))
-        stages = ", ".join(f"{stage} {took:.3f} s" for stage, took in methods["skinwright"]["stages"].items())
-        lines += ["", f"Skinwright by stage: {stages}."]
+        for method in ("skinwright", "blender add-on"):
+            stages = ", ".join(f"{stage} {took:.3f} s" for stage, took in methods[method]["stages"].items())
+            lines += ["", f"{method} by stage: {stages}."]
     return lines
 
 
