@@ -14,10 +14,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "bench")]
+sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "bench"))
 
 import bpy
-import conftest
+import extension
 import numpy as np
 import skinwright_native
 
@@ -64,8 +65,8 @@ def measure(size: str) -> str:
     source, target = load("source"), load(size)
     bones = [f"Bone {bone}" for bone in range(source["weights"].shape[1])]
     body, garment = make_object("Body", source), make_object("Garment", target)
-    vertex_groups = sys.modules[f"{conftest.PACKAGE}.scene.vertex_groups"]
-    rows = sys.modules[f"{conftest.PACKAGE}.csr"].Rows(*csr(source["weights"]))
+    vertex_groups = sys.modules[f"{extension.PACKAGE}.scene.vertex_groups"]
+    rows = sys.modules[f"{extension.PACKAGE}.csr"].Rows(*csr(source["weights"]))
     vertex_groups.write(body, bones, rows)
     body.modifiers.new("Armature", "ARMATURE").object = make_rig(bones)
     bpy.context.scene.skinwright.transfer.source = body
@@ -73,7 +74,7 @@ def measure(size: str) -> str:
         obj.select_set(obj == garment)
     bpy.context.view_layer.objects.active = garment
 
-    weights = skinwright_native.Weights(*rows, len(bones))
+    weights = skinwright_native.Weights(rows.indptr, rows.bones, rows.values, len(bones))
     arrays = source["positions"], source["triangles"], weights, target["positions"], target["triangles"]
     walls, calls = [], []
     for _ in range(ROUNDS):
@@ -97,7 +98,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def main(sizes: list[str]) -> None:
-    conftest.enable()
+    extension.enable()
     print(f"\nBlender {bpy.app.version_string}\n")
     print("| vertices | operator ms | native call ms | Blender's part ms | ratio |\n|---|---|---|---|---|")
     for size in sizes:

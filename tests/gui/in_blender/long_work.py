@@ -1,4 +1,4 @@
-"""A long transfer shows its progress, Esc stops it with nothing written, and left alone it ends; then the redo panel."""
+"""A long transfer shows its progress, Esc stops it with nothing written, left alone it ends; then the redo panel."""
 
 import sys
 from importlib import import_module
