@@ -13,16 +13,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests"))
-sys.path.insert(0, str(ROOT / "bench"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import bpy
 import extension
 import numpy as np
 import skinwright_native
 
-CACHE = ROOT / "out" / "bench"
+CACHE = Path(__file__).resolve().parent.parent / "out" / "bench"
 ROUNDS = 5
 
 
