@@ -6,7 +6,7 @@ import numpy as np
 
 
 def solve(d: np.ndarray, target: np.ndarray, old: np.ndarray, k: float = 0.05, h: float = 1.2) -> np.ndarray:
-    """Weights (4,) of one vertex from where its bones would take it, `d` (3, 4), its target (3,), old weights (4,)."""
+    """Weights (4,) of one vertex: `d` (3, 4) is where its bones would take it, `target` (3,), `old` weights (4,)."""
     free, p = d[:, :3] - d[:, 3:], target - d[:, 3]
     a = free.T @ free + k * k * (np.eye(3) + np.ones((3, 3)))
     b = free.T @ p + k * k * (old[:3] - old[3] + 1)
