@@ -19,12 +19,20 @@ MAY_IMPORT = {
     "native": {"csr"},
     "reporting": {"csr"},
     "scene": {"csr", "scene"},
-    "transfer": {"csr", "native", "reporting", "scene", "transfer"},
+    "jobs": {"csr", "native"},
+    "transfer": {"csr", "jobs", "native", "reporting", "scene", "transfer"},
+    "match_session": {"csr", "jobs", "native", "scene", "transfer"},
+    "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
+    "preview": {"csr", "match_session", "scene", "transfer"},
+    "weight_check": {"csr", "scene"},
     "sculpt_session": {"csr", "native", "reporting", "scene"},
     "properties": {"transfer"},
     "preferences": {"native"},
     "operators": {
         "csr",
+        "jobs",
+        "mask_painting",
+        "match_session",
         "native",
         "operators",
         "preferences",
@@ -33,12 +41,14 @@ MAY_IMPORT = {
         "scene",
         "sculpt_session",
         "transfer",
+        "weight_check",
     },
-    "ui": {"native", "properties", "ui"},
+    "ui": {"jobs", "match_session", "native", "preview", "properties", "ui"},
     "command_line": {"native", "reporting", "scene", "transfer"},
-    "__init__": {"command_line", "operators", "preferences", "properties", "ui"},
+    "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
 }
 MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}
+MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview", "weight_check"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 

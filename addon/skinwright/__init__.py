@@ -1,8 +1,9 @@
 """Skinwright: transfer skin weights, steer the transfer with a mask, turn sculpts into weights."""
 
 from . import command_line, operators, preferences, properties, ui
+from .scene import changes
 
-MODULES = (preferences, properties, *operators.MODULES, *ui.MODULES, command_line)
+MODULES = (preferences, properties, changes, *operators.MODULES, *ui.MODULES, command_line)
 
 
 def register() -> None:

@@ -14,6 +14,11 @@ class Rows(NamedTuple):
     values: NDArray[np.float32]
 
 
+def empty(n_rows: int) -> Rows:
+    """Rows without an entry."""
+    return Rows(np.zeros(n_rows + 1, np.uint32), np.zeros(0, np.uint32), np.zeros(0, np.float32))
+
+
 def entry_vertices(rows: Rows) -> NDArray[np.int64]:
     """(nnz,) the row of every entry."""
     return np.repeat(np.arange(len(rows.indptr) - 1), np.diff(rows.indptr))

@@ -7,16 +7,19 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .csr import Rows
 
+_module: Any = None
+_import_error = ""
 try:
-    import skinwright_native as _module
+    import skinwright_native
+
+    _module = skinwright_native
 except ImportError as error:
-    _module, _import_error = None, str(error)
-else:
-    _import_error = ""
+    _import_error = str(error)
 
 
 class NativeError(ValueError):
@@ -50,10 +53,53 @@ class Source:
         with _naming(name):
             self._source = _module.Source(positions, triangles, _module.Weights(*rows, n_bones))
 
-    def transfer(self, name: str, positions: NDArray, triangles: NDArray, **params: Any) -> tuple[Any, Rows]:
-        """skinwright_native.Transfer and its rows, for the target `name`; keyword arguments as in the stub."""
+
+class Inpainting:
+    """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
+
+    def __init__(self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0) -> None:
+        self.name = name
         with _naming(name):
-            transfer = self._source.transfer(positions, triangles, **params)
+            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads)
+        self.distance: NDArray[np.float32] = self._inpainting.distance
+        self.angle: NDArray[np.float32] = self._inpainting.angle
+        self.islands: NDArray[np.uint32] = self._inpainting.islands
+
+    def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
+        """(V,) which vertices match; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.matched(**thresholds)
+
+    def start(self, **params: Any) -> "Job":
+        """Solve on threads of Rust's own."""
+        with _naming(self.name):
+            return Job(self.name, self._inpainting.start(**params))
+
+
+class Job:
+    """A solve going on; `progress` runs from 0 to 1."""
+
+    def __init__(self, name: str, job: Any) -> None:
+        self._name, self._job = name, job
+
+    @property
+    def progress(self) -> float:
+        """The share of the work that is done."""
+        return self._job.progress
+
+    @property
+    def done(self) -> bool:
+        """Whether `result` returns at once."""
+        return self._job.done
+
+    def cancel(self) -> None:
+        """Ask the work to stop; `result` then raises NativeError."""
+        self._job.cancel()
+
+    def result(self) -> tuple[Any, Rows]:
+        """skinwright_native.Transfer and its rows; waits for them."""
+        with _naming(self._name):
+            transfer = self._job.result()
         weights = transfer.weights
         return transfer, Rows(weights.indptr, weights.bones, weights.values)
 

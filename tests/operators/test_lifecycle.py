@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import conftest
+import extension
 import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
@@ -34,14 +34,14 @@ def has_draw(name):
 
 
 def test_enabling_and_disabling_leaves_no_trace(addon):
-    conftest.disable()
+    extension.disable()
     before = trace()
     for _ in range(3):
-        conftest.enable()
+        extension.enable()
         assert trace() != before
-        conftest.disable()
+        extension.disable()
         assert trace() == before
-    conftest.enable()
+    extension.enable()
 
 
 def test_the_command_is_taken_away(addon, monkeypatch):

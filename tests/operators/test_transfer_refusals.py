@@ -309,7 +309,11 @@ class TestWarnings:
         parent.scale.x = 2
         coat.parent, coat.rotation_euler.z = parent, 0.5
         bpy.context.view_layer.update()
-        assert "Coat sheared" in self.warnings(plain(body, coat))
+        assert "shears Coat" in self.warnings(plain(body, coat))
+
+    def test_mirroring_without_vertex_groups(self, plain, body, coat):
+        coat.modifiers.new("Mirror", "MIRROR").use_mirror_vertex_groups = False
+        assert "Vertex Groups is off in the modifier Mirror of Coat" in self.warnings(plain(body, coat))
 
     def test_unnormalised_source(self, plain, body, coat):
         body.vertex_groups["Arm.L"].add([0, 1], 0.5, "ADD")

@@ -133,6 +133,27 @@ def test_modifiers_before_the_armature(body, coat):
     assert all(m.show_viewport for m in coat.modifiers)
 
 
+def test_half_a_garment_under_a_mirror(body):
+    """The Mirror modifier finds the partner groups and turns left weights into right ones."""
+    t = [float(v.co.x > 0.3) for v in body.data.vertices]
+    for vertex, value in enumerate(t):
+        body.vertex_groups["Arm.L"].add([vertex], value, "REPLACE")
+        body.vertex_groups["Arm.R"].add([vertex], 1 - value, "REPLACE")
+    glove = builders.grid("Glove", 5, size=0.4, z=0.01)
+    for vertex in glove.data.vertices:
+        vertex.co.x += 0.7
+    modifier = glove.modifiers.new("Mirror", "MIRROR")
+    modifier.use_clip = modifier.use_mirror_merge = False
+    builders.select(glove)
+    run()
+    assert [m.type for m in glove.modifiers] == ["MIRROR", "ARMATURE"]
+    bone = body.find_armature().pose.bones["Arm.R"]
+    bone.location.y = 5
+    evaluated = glove.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    heights = {v.co.x > 0: v.co.z for v in evaluated.vertices}
+    assert heights[True] == pytest.approx(0.01) and heights[False] == pytest.approx(5.01)
+
+
 def test_current_geometry_follows_the_pose(body, coat):
     """A coat modelled on the posed body matches it as posed, and not at rest."""
     for bone in body.find_armature().pose.bones:

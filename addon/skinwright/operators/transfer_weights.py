@@ -6,13 +6,17 @@ from bpy.types import Context, Event, Object, Operator
 
 from .. import native, preferences
 from ..properties import TransferOptions
+from ..reporting import Report
 from ..scene.error import SceneError
-from ..transfer import transfer_weights
+from ..transfer import TransferParams, steps, transfer_weights
+from .long_work import LongWork
 
 MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
+# Below this a transfer takes less than the blink of a progress bar.
+LONG_WORK_VERTICES = 50_000
 
 
-class SKINWRIGHT_OT_transfer_weights(TransferOptions, Operator):
+class SKINWRIGHT_OT_transfer_weights(LongWork, TransferOptions, Operator):
     """The operator; all of the work is in the function it calls."""
 
     bl_idname = "skinwright.transfer_weights"
@@ -40,7 +44,10 @@ class SKINWRIGHT_OT_transfer_weights(TransferOptions, Operator):
         for name in TransferOptions.__annotations__:
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(settings, name))
-        return self.execute(context)
+        vertices = sum(len(target.data.vertices) for target in targets(context))
+        if vertices < LONG_WORK_VERTICES or self.freeze:
+            return self.execute(context)
+        return self.begin(context, steps(*self._inputs(context)))
 
     def draw(self, _context: Context) -> None:
         """The redo panel."""
@@ -59,17 +66,23 @@ class SKINWRIGHT_OT_transfer_weights(TransferOptions, Operator):
         if self.freeze:
             self.report({"INFO"}, "Frozen: changes take effect once Freeze Operator is off")
             return {"FINISHED"}
-        source = context.scene.skinwright.transfer.source
-        params = self.to_params(preferences.threads(context))
         try:
-            report = transfer_weights(context, source, targets(context), params)
+            report = transfer_weights(*self._inputs(context))
         except (SceneError, native.NativeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        return self.complete(context, report)
+
+    def complete(self, _context: Context, report: Report) -> set[str]:
+        """Say what was done."""
         self.report({"INFO"}, report.sentence())
         for warning in report.all_warnings():  # last, as the status bar shows the last
             self.report({"WARNING"}, warning)
         return {"FINISHED"}
+
+    def _inputs(self, context: Context) -> tuple[Context, Object, list[Object], TransferParams]:
+        params = self.to_params(preferences.threads(context))
+        return context, context.scene.skinwright.transfer.source, targets(context), params
 
 
 def targets(context: Context) -> list[Object]:

@@ -1,5 +1,16 @@
 """The only code that touches Blender's data: numpy arrays out, numpy arrays in."""
 
-from . import armature, error, mask, mesh, vertex_groups
+from . import armature, attributes, changes, deformation, depth, error, mask, mesh, poses, vertex_groups
 
-__all__ = ["armature", "error", "mask", "mesh", "vertex_groups"]
+__all__ = [
+    "armature",
+    "attributes",
+    "changes",
+    "deformation",
+    "depth",
+    "error",
+    "mask",
+    "mesh",
+    "poses",
+    "vertex_groups",
+]

@@ -62,14 +62,14 @@ def read(obj: bpy.types.Object, *, evaluated: bool = False) -> Geometry:
     """
     matrix = np.array(obj.matrix_world, dtype=np.float64)
     determinant = _checked_determinant(obj, matrix)
-    local = _evaluated_positions(obj) if evaluated else _rest_positions(obj.data)
-    triangles = _triangles(obj)
+    local = _evaluated_positions(obj) if evaluated else rest_positions(obj.data)
+    triangle = triangles(obj)
     if determinant < 0:
-        triangles = triangles[:, ::-1]
+        triangle = triangle[:, ::-1]
     with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
         positions = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
     _check_finite(obj, positions)
-    return Geometry(positions, np.ascontiguousarray(triangles))
+    return Geometry(positions, np.ascontiguousarray(triangle))
 
 
 def is_sheared(obj: bpy.types.Object) -> bool:
@@ -84,6 +84,26 @@ def selected(obj: bpy.types.Object) -> NDArray[np.bool_]:
     select = np.empty(len(obj.data.vertices), bool)
     obj.data.vertices.foreach_get("select", select)
     return select
+
+
+def edges(obj: bpy.types.Object) -> NDArray[np.int32]:
+    """(E, 2) vertices of the edges."""
+    vertices = np.empty(len(obj.data.edges) * 2, np.int32)
+    obj.data.edges.foreach_get("vertices", vertices)
+    return vertices.reshape(-1, 2)
+
+
+def select(obj: bpy.types.Object, chosen: NDArray[np.bool_]) -> None:
+    """Select these vertices (V,) and what lies wholly between them; not in Edit mode."""
+    mesh = obj.data
+    mesh.vertices.foreach_set("select", chosen)
+    mesh.edges.foreach_set("select", chosen[edges(obj)].all(axis=1))
+    start, corner = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.loops), np.int32)
+    mesh.polygons.foreach_get("loop_start", start)
+    mesh.loops.foreach_get("vertex_index", corner)
+    if start.size:
+        mesh.polygons.foreach_set("select", np.logical_and.reduceat(chosen[corner], start))
+    mesh.update()
 
 
 def other_users(obj: bpy.types.Object) -> list[str]:
@@ -126,14 +146,16 @@ def _checked_determinant(obj: bpy.types.Object, matrix: NDArray[np.float64]) -> 
     return determinant
 
 
-def _rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(V, 3) local positions that modifiers start from."""
     # With shape keys it is the Basis that the armature deforms; the mesh's own positions may lag behind it.
     if mesh.shape_keys:
         return _vectors(mesh.shape_keys.reference_key.data, "co")
-    return _mesh_positions(mesh)
+    return positions(mesh)
 
 
-def _mesh_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(V, 3) local positions of a mesh, evaluated or not."""
     if not mesh.vertices:
         return np.empty((0, 3), np.float32)
     return _vectors(mesh.attributes["position"].data, "vector")
@@ -148,12 +170,12 @@ def _vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np
 def _evaluated_positions(obj: bpy.types.Object) -> NDArray[np.float32]:
     with _topology_kept(obj):
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        positions = _mesh_positions(evaluated.data)
+        now = positions(evaluated.data)
     if not evaluated.is_evaluated:
         raise SceneError(f"{obj.name} is disabled or excluded, so it has no current shape: show it or use rest shapes")
-    if len(positions) != len(obj.data.vertices):
+    if len(now) != len(obj.data.vertices):
         raise SceneError(f"{obj.name} has another number of vertices when evaluated: use rest shapes")
-    return positions
+    return now
 
 
 @contextmanager
@@ -175,11 +197,12 @@ def _check_finite(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None
         raise SceneError(f"{obj.name} has a coordinate that is not a number at vertex {bad[0]}: move or delete it")
 
 
-def _triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
+def triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
+    """(T, 3) of its faces as they are, before modifiers. Raises SceneError where there are none."""
     mesh = obj.data
     mesh.calc_loop_triangles()
     if not mesh.loop_triangles:
         raise SceneError(f"{obj.name} has no faces: weights are carried over surfaces, so give it some")
-    triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    return triangles.reshape(-1, 3).astype(np.uint32)
+    triangle = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangle)
+    return triangle.reshape(-1, 3).astype(np.uint32)

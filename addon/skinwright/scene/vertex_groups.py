@@ -1,16 +1,51 @@
 """Vertex groups as CSR arrays, read and written exactly."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
+from . import deform_array
 from .error import SceneError
 
 # Blender stores a name in 64 bytes, the last of them zero.
 _NAME_BYTES = 63
+
+# Row, group index and weight of each, in stored order.
+Memberships = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All groups of an object: `rows` over `names`, and the active one."""
+
+    names: list[str]
+    rows: Rows
+    active: str
+
+
+def snapshot(obj: bpy.types.Object) -> Snapshot:
+    """What `restore` needs to bring everything back; not in Edit mode."""
+    names = [group.name for group in obj.vertex_groups]
+    return Snapshot(names, read(obj, names), obj.vertex_groups.active.name if obj.vertex_groups.active else "")
+
+
+def restore(obj: bpy.types.Object, before: Snapshot) -> None:
+    """Bring back every membership bit for bit; groups made since then go."""
+    for group in list(obj.vertex_groups):
+        if group.name not in before.names:
+            obj.vertex_groups.remove(group)
+    write(obj, before.names, before.rows)
+    activate(obj, before.active)
+
+
+def activate(obj: bpy.types.Object, name: str) -> None:
+    """Make the group of this name the active one, if there is one."""
+    if name in obj.vertex_groups:
+        obj.vertex_groups.active = obj.vertex_groups[name]
 
 
 def locked(obj: bpy.types.Object) -> set[str]:
@@ -24,14 +59,14 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     `bones` index into `names` and ascend in each row; a name the object lacks has no entries.
     Raises SceneError for a weight that is not a number.
     """
-    counts, groups, values = _memberships(obj.data.vertices)
-    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], groups)
+    n = len(obj.data.vertices)
+    row, group, values = _memberships(obj.data, np.arange(n))
+    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], group)
     keep = column >= 0
-    vertex = np.repeat(np.arange(len(counts)), counts)[keep]
-    column, values = column[keep], values[keep]
+    vertex, column, values = row[keep], column[keep], values[keep]
     _check_finite(obj, names, vertex, column, values)
-    order = np.lexsort((column, vertex))
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=len(counts)))])
+    order = np.argsort(vertex * len(names) + column, kind="stable")
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n))])
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
 
 
@@ -41,21 +76,21 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     `vertices` are distinct; None stands for all. Groups the object lacks are created; memberships in `names` that a
     row does not hold are removed; other groups, other vertices and the locks stay. Values are stored bit for bit.
     """
-    groups = ensure(obj, names)
+    owned = np.array([group.index for group in ensure(obj, names)], np.int64)
     mesh = obj.data
     indices = np.arange(len(mesh.vertices)) if vertices is None else np.asarray(vertices)
-    vertex = np.repeat(indices, np.diff(rows.indptr))
-    # One call a group makes the members, one call a vertex sets their weights: faster than one call a weight, and
-    # the mesh is never rebuilt as it is by a bmesh round trip (shape keys, selection, odd faces).
-    for column, group in enumerate(groups):
-        members = vertex[rows.bones == column]
-        if members.size:
-            group.add(members.tolist(), 1.0, "REPLACE")
-    stale_vertex, stale_group = _set_weights(mesh, indices, [group.index for group in groups], rows)
-    for group in groups:
-        members = stale_vertex[stale_group == group.index]
-        if members.size:
-            group.remove(members.tolist())
+    row, group = np.repeat(np.arange(len(indices)), np.diff(rows.indptr)), owned[rows.bones]
+    held_row, held_group, _ = _memberships(mesh, indices)
+    mine = np.isin(held_group, owned)
+    held_row, held_group = held_row[mine], held_group[mine]
+    missing = ~_find(np.sort(_keys(held_row, held_group), kind="stable"), _keys(row, group))[1]
+    stale = ~_find(np.sort(_keys(row, group), kind="stable"), _keys(held_row, held_group))[1]
+    # Only these change the memberships themselves, in one call a group; the rest is values.
+    for index, members in _by_group(indices[held_row[stale]], held_group[stale]):
+        obj.vertex_groups[index].remove(members)
+    for index, members in _by_group(indices[row[missing]], group[missing]):
+        obj.vertex_groups[index].add(members, 1.0, "REPLACE")
+    _set_weights(mesh, indices, row, group, rows.values)
     mesh.update()
 
 
@@ -64,7 +99,12 @@ def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.Vertex
     stored = [_stored(name) for name in names]
     if len(set(stored)) != len(stored):
         raise SceneError(f"{obj.name} would get two groups of one name: shorten the names beyond {_NAME_BYTES} bytes")
-    return [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+    active = obj.vertex_groups.active
+    groups = [obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name) for name in stored]
+    if active:
+        # A new group becomes the active one: not under a brush that is painting another.
+        activate(obj, active.name)
+    return groups
 
 
 def _stored(name: str) -> str:
@@ -72,41 +112,64 @@ def _stored(name: str) -> str:
     return name.encode()[:_NAME_BYTES].decode(errors="ignore")
 
 
-def _memberships(vertices) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.float32]]:
-    """Members a vertex, then group index and weight of every membership in stored order."""
+def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
+    """Row in `indices`, group index and weight of every membership of these vertices, in stored order."""
+    array = deform_array.open_array(mesh, indices)
+    return _from_array(array) if array else _from_api(mesh, indices)
+
+
+def _from_array(array: deform_array.DeformArray) -> Memberships:
+    counts = np.diff(array.indptr)
+    return np.repeat(np.arange(len(counts)), counts), array.groups().astype(np.int64), array.weights()
+
+
+def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
+    """By Blender's public interface alone: 60 times slower."""
     counts: list[int] = []
     groups: list[int] = []
     values: list[float] = []
-    for vertex in vertices:
-        members = vertex.groups
+    for members in (mesh.vertices[i].groups for i in indices.tolist()):
         counts.append(len(members))
         for member in members:
             groups.append(member.group)
             values.append(member.weight)
-    return np.array(counts, np.intp), np.array(groups, np.int32), np.array(values, np.float32)
+    row = np.repeat(np.arange(len(indices)), np.array(counts, np.int64))
+    return row, np.array(groups, np.int64), np.array(values, np.float32)
 
 
 def _set_weights(
-    mesh: bpy.types.Mesh, indices: NDArray[np.integer], groups: list[int], rows: Rows
-) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
-    """Set the weights of members that already exist; gives the (vertex, group) of members the rows do not hold."""
-    vertices = mesh.vertices
-    counts, group, values = _memberships(vertices[i] for i in indices.tolist())
-    row = np.repeat(np.arange(len(counts)), counts)
-    column = _lookup(groups, group)
-    width = len(groups) + 1
-    wanted = np.repeat(np.arange(len(counts)), np.diff(rows.indptr)) * width + rows.bones
-    order = np.argsort(wanted, kind="stable")
-    position, held = _find(wanted[order], row * width + column)
-    held &= column >= 0
-    values[held] = rows.values[order[position[held]]]
-    ends = np.cumsum(counts)
-    touched = np.flatnonzero(np.bincount(row[held], minlength=len(counts)))
-    spans = np.stack([indices[touched], (ends - counts)[touched], ends[touched]], axis=1)
-    for index, start, end in spans.tolist():
-        vertices[index].groups.foreach_set("weight", values[start:end])
-    stale = (column >= 0) & ~held
-    return indices[row[stale]], group[stale]
+    mesh: bpy.types.Mesh,
+    indices: NDArray[np.integer],
+    row: NDArray[np.int64],
+    group: NDArray[np.int64],
+    values: NDArray[np.float32],
+) -> None:
+    """Give memberships that exist already, (row in `indices`, group), their values."""
+    array = deform_array.open_array(mesh, indices)
+    held_row, held_group, now = _from_array(array) if array else _from_api(mesh, indices)
+    order = np.argsort(_keys(row, group), kind="stable")
+    position, found = _find(_keys(row, group)[order], _keys(held_row, held_group))
+    now[found] = values[order[position[found]]]
+    if array:
+        array.set_weights(now)
+        return
+    ends = np.cumsum(np.bincount(held_row, minlength=len(indices)))
+    for r in np.unique(row).tolist():
+        start = ends[r - 1] if r else 0
+        mesh.vertices[indices[r]].groups.foreach_set("weight", now[start : ends[r]])
+
+
+def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator[tuple[int, list[int]]]:
+    """Each group's index with its vertices."""
+    order = np.argsort(group, kind="stable")
+    for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        if members.size:
+            yield int(group[members[0]]), vertex[members].tolist()
+
+
+def _keys(row: NDArray[np.int64], group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """One number a membership. Blender has at most 2^31 groups."""
+    return row << 31 | group
 
 
 def _find(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -117,12 +180,13 @@ def _find(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> tuple[NDAr
     return position, ordered[position] == keys
 
 
-def _lookup(groups: list[int], group: NDArray[np.int32]) -> NDArray[np.int64]:
+def _lookup(groups: list[int], group: NDArray[np.int64]) -> NDArray[np.int64]:
     """Position of each group index in `groups`, or -1. A mesh may hold indices beyond its object's list of groups."""
-    column = np.full(max([*groups, group.max(initial=0)]) + 2, -1, np.int64)
+    beyond = max(groups, default=-1) + 1
+    column = np.full(beyond + 2, -1, np.int64)
     column[groups] = np.arange(len(groups))
     column[-1] = -1  # where a missing group's index, -1, has landed
-    return column[group]
+    return column[np.minimum(group, beyond)]
 
 
 def _check_finite(obj, names, vertex, column, values) -> None:

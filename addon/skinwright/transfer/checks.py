@@ -37,7 +37,7 @@ def _check_target(source: bpy.types.Object, target: bpy.types.Object) -> None:
 
 
 def _check_shared(objects: list[bpy.types.Object]) -> None:
-    first = {}
+    first: dict[bpy.types.ID, bpy.types.Object] = {}
     for obj in objects:
         other = first.setdefault(obj.data, obj)
         if other != obj:
@@ -50,7 +50,7 @@ def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
     found = []
     rigs = {modifier.object for modifier in armature.modifiers(body.object)}
-    if len(rigs) > 1:
+    if body.armature and len(rigs) > 1:
         found.append(f"{body.object.name} has {len(rigs)} armatures; {body.armature.name} was taken")
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
@@ -66,6 +66,7 @@ def garment_warnings(body: Body, garment: Garment, params: TransferParams) -> li
     found = (
         _alignment(body, garment),
         _shear(body, garment),
+        _mirror(garment),
         _pose(body, garment, params),
         _rig(body, garment),
         _other_bones(body, garment, params),
@@ -85,7 +86,20 @@ def _alignment(body: Body, garment: Garment) -> str:
 
 def _shear(body: Body, garment: Garment) -> str:
     sheared = [obj.name for obj in (body.object, garment.object) if mesh.is_sheared(obj)]
-    return f"{' and '.join(sheared)} sheared by the scale of a parent: apply it if angles look wrong" if sheared else ""
+    if not sheared:
+        return ""
+    return f"The scale of a parent shears {' and '.join(sheared)}: apply it if the angles of the match look wrong"
+
+
+def _mirror(garment: Garment) -> str:
+    """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
+    half = [m for m in garment.object.modifiers if m.type == "MIRROR" and not m.use_mirror_vertex_groups]
+    if not half:
+        return ""
+    return (
+        f"Vertex Groups is off in the modifier {half[0].name} of {garment.object.name}: "
+        "both sides will follow the bones of one"
+    )
 
 
 def _pose(body: Body, garment: Garment, params: TransferParams) -> str:

@@ -1,4 +1,7 @@
-"""From arrays to the rows that will be written; nothing of Blender is touched."""
+"""From arrays to the rows that will be written; nothing of Blender is touched.
+
+The functions are generators: each yields a job and is sent what it gave, so that the caller decides how to wait.
+"""
 
 import time
 from dataclasses import dataclass
@@ -9,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
+from ..jobs import Jobs
 from . import merging, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
@@ -25,14 +29,28 @@ class Result:
     seconds: float
 
 
-def compute(body: Body, garments: list[Garment], params: TransferParams) -> list[Result]:
+def compute(body: Body, garments: list[Garment], params: TransferParams) -> Jobs[list[Result]]:
     """The new rows of every garment. Raises native.NativeError where there is no answer."""
-    bones = _source(body, body.bone_weights, len(body.bones)) if body.bones else None
+    bones = bone_source(body) if body.bones else None
     fields = None
     if body.fields:
         packed = scalar_fields.pack(body.field_weights, len(body.fields))
         fields = _source(body, packed, len(body.fields) + 1)
-    return [_compute_one(body, garment, bones, fields, params) for garment in garments]
+    results = []
+    for garment in garments:
+        results.append((yield from _compute_one(body, garment, bones, fields, params)))
+    return results
+
+
+def bone_source(body: Body) -> native.Source:
+    """The body with its bones, prepared."""
+    return _source(body, body.bone_weights, len(body.bones))
+
+
+def prepare(source: native.Source, garment: Garment, params: TransferParams) -> native.Inpainting:
+    """The garment laid over the body; the mask and the thresholds may still change."""
+    geometry = garment.geometry
+    return native.Inpainting(source, garment.object.name, geometry.positions, geometry.triangles, params.threads)
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
@@ -42,34 +60,35 @@ def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
 
 def _compute_one(
     body: Body, garment: Garment, bones: native.Source | None, fields: native.Source | None, params: TransferParams
-) -> Result:
+) -> Jobs[Result]:
     start = time.perf_counter()
-    names, rows = [], None
-    if bones:
-        transfer, rows = _bone_rows(bones, garment, params)
-        names = garment.names
+    names: list[str] = []
+    rows = csr.empty(len(garment.writable))
     if fields:
-        field_transfer, field_rows = _field_rows(fields, garment, params, len(body.fields))
-        transfer = transfer if bones else field_transfer
-        rows = csr.beside(rows, len(names), field_rows) if bones else field_rows
-        names = names + body.fields
+        transfer, rows = yield from _field_rows(fields, garment, params, len(body.fields))
+        names = body.fields
+    if bones:
+        transfer, rows_of_bones = yield from bone_rows(prepare(bones, garment, params), garment, params)
+        rows = csr.beside(rows, len(names), rows_of_bones)
+        names = names + garment.names
+    return to_result(body, garment, transfer, names, rows, time.perf_counter() - start)
+
+
+def to_result(body: Body, garment: Garment, transfer: Any, names: list[str], rows: Rows, seconds: float) -> Result:
+    """The columns that were chosen, without locked groups, and the vertices that have a row."""
     wanted = np.array([name in body.chosen - garment.locks for name in names], bool)
     # A vertex without a row is one the policy for islands leaves alone.
     written = (np.diff(transfer.weights.indptr) > 0) & garment.writable
-    return Result(
-        transfer=transfer,
-        names=[name for name, kept in zip(names, wanted, strict=True) if kept],
-        rows=csr.take_columns(rows, wanted),
-        written=written,
-        seconds=time.perf_counter() - start,
-    )
+    names = [name for name, kept in zip(names, wanted, strict=True) if kept]
+    return Result(transfer, names, csr.take_columns(rows, wanted), written, seconds)
 
 
-def _bone_rows(bones: native.Source, garment: Garment, params: TransferParams) -> tuple[Any, Rows]:
+def bone_rows(inpainting: native.Inpainting, garment: Garment, params: TransferParams) -> Jobs[tuple[Any, Rows]]:
+    """The library's answer and the rows over `garment.names`."""
     joined = params.mix_factor < 1 or bool(garment.locked.any())
     # Where old weights join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
-    transfer, rows = _transfer(bones, garment, params, limit)
+    transfer, rows = yield _start(inpainting, garment, params, limit)
     _check(garment, rows, limit)
     if joined:
         rows = merging.merge(
@@ -91,12 +110,12 @@ def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
         raise native.NativeError(f"{garment.object.name}: the answer is no set of weights; please report this")
 
 
-def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> tuple[Any, Rows]:
-    transfer, rows = _transfer(fields, garment, params, max_influences=0)
+def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> Jobs[tuple[Any, Rows]]:
+    transfer, rows = yield _start(prepare(fields, garment, params), garment, params, max_influences=0)
     return transfer, merging.mix(scalar_fields.unpack(rows, n), garment.fields_before, params.mix_factor)
 
 
-def _transfer(source: native.Source, garment: Garment, params: TransferParams, max_influences: int) -> tuple[Any, Rows]:
+def _start(inpainting: native.Inpainting, garment: Garment, params: TransferParams, max_influences: int) -> native.Job:
     keywords = params.native() | {"mask": garment.mask, "max_influences": max_influences}
-    geometry = garment.geometry
-    return source.transfer(garment.object.name, geometry.positions, geometry.triangles, **keywords)
+    del keywords["threads"]
+    return inpainting.start(**keywords)

@@ -114,7 +114,7 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
     garment = Garment(
         object=target,
         geometry=mesh.read(target, evaluated=params.evaluated),
-        mask=_read_mask(target, params.mask),
+        mask=read_mask(target, params.mask),
         writable=mesh.selected(target) if params.selected_only else np.ones(len(target.data.vertices), bool),
         locks=locks,
         names=names,
@@ -132,7 +132,8 @@ def _bone_names(target: bpy.types.Object, body: Body) -> set[str]:
     return set().union(*(armature.deform_bones(rig) for rig in rigs))
 
 
-def _read_mask(target: bpy.types.Object, settings: Mask | None) -> NDArray[np.uint8] | None:
+def read_mask(target: bpy.types.Object, settings: Mask | None = None) -> NDArray[np.uint8] | None:
+    """The mask by `settings` or by the target's own; None where it has none."""
     settings = settings or target.skinwright.mask()
     if settings is None:
         return None

@@ -1,5 +1,5 @@
 """Panels and menus. Operators are named by bl_idname only."""
 
-from . import menus, panel
+from . import match_panel, menus, overlay, panel
 
-MODULES = (panel, menus)
+MODULES = (panel, match_panel, menus, overlay)

@@ -4,10 +4,11 @@ import bpy
 from bl_ui.utils import PresetPanel
 from bpy.types import Context, Panel, UILayout
 
+from .. import jobs
 from ..native import problem
 
 
-class _Tab:
+class Tab:
     """Where all of Skinwright's panels live."""
 
     bl_space_type = "VIEW_3D"
@@ -15,16 +16,11 @@ class _Tab:
     bl_category = "Weights"
 
 
-class _TransferStep(_Tab):
+class _TransferStep(Tab):
     """A sub-panel of settings under the button."""
 
     bl_parent_id = "SKINWRIGHT_PT_transfer"
     bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        self.draw_settings(self.layout.column(), context)
 
 
 class SKINWRIGHT_PT_transfer_presets(PresetPanel, Panel):
@@ -36,7 +32,7 @@ class SKINWRIGHT_PT_transfer_presets(PresetPanel, Panel):
     preset_add_operator = "skinwright.transfer_preset_add"
 
 
-class SKINWRIGHT_PT_transfer(_Tab, Panel):
+class SKINWRIGHT_PT_transfer(Tab, Panel):
     """Source and button; all else has a default that does."""
 
     bl_label = "Transfer Weights"
@@ -48,14 +44,14 @@ class SKINWRIGHT_PT_transfer(_Tab, Panel):
 
     def draw(self, context: Context) -> None:
         """Problems first, as red rows."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = _settings_column(self.layout)
         if problem():
             _alert(layout, problem())
         settings = context.scene.skinwright.transfer
         layout.prop(settings, "source")
         layout.prop(settings, "groups")
+        if jobs.running:
+            layout.progress(factor=jobs.running.progress, text=f"{jobs.running.progress:.0%}, Esc stops")
         layout.operator("skinwright.transfer_weights", icon="MOD_VERTEX_WEIGHT")
 
 
@@ -64,23 +60,24 @@ class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):
 
     bl_label = "Matching"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_matching(layout)
+        context.scene.skinwright.transfer.draw_matching(_settings_column(self.layout))
 
 
 class SKINWRIGHT_PT_transfer_mask(_TransferStep, Panel):
     """The active mesh's match mask."""
 
-    bl_label = "Match Mask"
+    bl_label = "Mask"
 
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Each mesh has its own mask."""
         return context.object is not None and context.object.type == "MESH"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """The group and how it is read."""
+        layout = _settings_column(self.layout)
         settings = context.object.skinwright
         layout.prop_search(settings, "mask_group", context.object, "vertex_groups", icon="GROUP_VERTEX")
         column = layout.column()
@@ -96,9 +93,9 @@ class SKINWRIGHT_PT_transfer_inpainting(_TransferStep, Panel):
 
     bl_label = "Inpainting"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_inpainting(layout)
+        context.scene.skinwright.transfer.draw_inpainting(_settings_column(self.layout))
 
 
 class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
@@ -106,9 +103,15 @@ class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
 
     bl_label = "Writing"
 
-    def draw_settings(self, layout: UILayout, context: Context) -> None:
+    def draw(self, context: Context) -> None:
         """As the operator lays them out."""
-        context.scene.skinwright.transfer.draw_writing(layout)
+        context.scene.skinwright.transfer.draw_writing(_settings_column(self.layout))
+
+
+def _settings_column(layout: UILayout) -> UILayout:
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout.column()
 
 
 def _alert(layout: UILayout, sentence: str) -> None:

@@ -1,0 +1,94 @@
+"""Long work as a generator that yields native jobs: waited for at once, or polled so that Blender's window lives on."""
+
+import sys
+import time
+from collections.abc import Callable, Generator
+from typing import Any, TypeVar
+
+import bpy
+
+from . import native
+from .csr import Rows
+
+T = TypeVar("T")
+# Each job that is yielded is answered with its result.
+Jobs = Generator[native.Job, tuple[Any, Rows], T]
+
+# What the panel shows the progress of.
+running: "Runner | None" = None
+
+_QUIET_SECONDS = 1.0
+
+
+class Runner:
+    """Work under way; `result` is there once `done`. Poll it from one place."""
+
+    def __init__(self, steps: Jobs[Any]) -> None:
+        self._steps = steps
+        self._job: native.Job | None = None
+        self.done = False
+        self.result: Any = None
+        self._send(None)
+
+    @property
+    def progress(self) -> float:
+        """The share of the present job that is done."""
+        return self._job.progress if self._job else 1.0
+
+    def poll(self) -> bool:
+        """Take a step if the present job has ended; gives whether all is done. Raises what the steps raise."""
+        if self._job and self._job.done:
+            self._answer()
+        return self.done
+
+    def wait(self, seconds: float) -> None:
+        """Give the present job this long to end."""
+        end = time.perf_counter() + seconds
+        while self._job and not self._job.done and time.perf_counter() < end:
+            time.sleep(0.001)
+
+    def cancel(self) -> None:
+        """Stop without the steps that are left."""
+        if self._job:
+            self._job.cancel()
+        self._steps.close()
+        self.done = True
+
+    def _answer(self) -> None:
+        try:
+            answer = self._job.result()
+        except native.NativeError:
+            self._steps.close()
+            raise
+        self._send(answer)
+
+    def _send(self, answer: Any) -> None:
+        try:
+            self._job = self._steps.send(answer)
+        except StopIteration as end:
+            self._job, self.done, self.result = None, True, end.value
+
+
+def wait(steps: Jobs[T]) -> T:
+    """Do all steps before returning; without a window the progress of long work goes to stderr."""
+    runner, started = Runner(steps), time.perf_counter()
+    watch = _print_progress() if bpy.app.background else None
+    while not runner.poll():
+        # Short work is not made to wait for the next look at it.
+        time.sleep(min(0.1, 0.0005 + 0.05 * (time.perf_counter() - started)))
+        if watch:
+            watch(runner.progress)
+    return runner.result
+
+
+def _print_progress() -> Callable[[float], None]:
+    """A watch that writes to stderr, once a tenth and not for short work."""
+    start, last = time.perf_counter(), [-1]
+
+    def watch(progress: float) -> None:
+        tenth = int(progress * 10)
+        if time.perf_counter() - start > _QUIET_SECONDS and tenth != last[0]:
+            last[0] = tenth
+            print(f"Skinwright: {tenth * 10} %", file=sys.stderr, flush=True)
+
+    return watch

@@ -1,0 +1,36 @@
+"""Opens the add-on's tab, takes a picture, and looks for anything left behind after disabling."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import bpy
+from driver import Steps, Window, disable, enable, record, start
+
+
+def left_behind() -> dict[str, list[str]]:
+    handlers = bpy.app.handlers
+    kinds = [name for name in dir(handlers) if isinstance(getattr(handlers, name), list)]
+    return {
+        "handlers": [f"{kind}: {h.__module__}" for kind in kinds for h in getattr(handlers, kind)],
+        "types": [name for name in dir(bpy.types) if "skinwright" in name.lower()],
+        "properties": [name for name in dir(bpy.types.Scene) if "skinwright" in name.lower()],
+    }
+
+
+def steps(window: Window) -> Steps:
+    yield 1.0
+    before = left_behind()
+    for _ in range(2):
+        enable()
+        yield 0.3
+        disable()
+        assert left_behind() == before, (left_behind(), before)
+    enable()
+    yield from window.show_tab("Weights")
+    yield from window.screenshot("panel")
+    record["tab"] = window.region("UI").active_panel_category
+
+
+start(steps)

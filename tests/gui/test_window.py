@@ -1,0 +1,11 @@
+"""What only a real window can show; each test runs one script of `in_blender/`."""
+
+
+def test_the_panel_opens_and_nothing_is_left_behind(blender):
+    assert blender.run("smoke")["tab"] == "Weights"
+
+
+def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
+    seen = blender.run("match_mask", size=(1100, 800))
+    assert seen["many"][0] > seen["few"][0]
+    assert seen["masked"] > 20

@@ -1,0 +1,210 @@
+"""The match on show, the mask's edits, and painting without a window."""
+
+from importlib import import_module
+
+import builders
+import numpy as np
+import pytest
+
+PACKAGE = "bl_ext.user_default.skinwright"
+bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+
+
+@pytest.fixture
+def coat(scene, native):
+    """A grid over the middle of the body, one half of it too far away; and a loose patch farther still."""
+    body = builders.body()
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.5, 0.5, 9))
+    sheet = np.stack([x.ravel(), y.ravel(), np.where(x.ravel() > 0.05, 0.5, 0.01)], axis=1)
+    first = (np.arange(8)[None] + 9 * np.arange(8)[:, None]).ravel()
+    faces = [(i, i + 1, i + 10, i + 9) for i in first]
+    patch = np.array([(0, 0, 1), (0.1, 0, 1), (0, 0.1, 1)])
+    obj = builders.mesh("Coat", np.concatenate([sheet, patch]), [*faces, (81, 82, 83)])
+    scene.skinwright.transfer.source = body
+    scene.skinwright.transfer.distance_mode = "ABSOLUTE"
+    scene.skinwright.transfer.max_distance = 0.1
+    scene.skinwright.transfer.max_normal_angle = 3.2
+    builders.select(obj)
+    return obj
+
+
+@pytest.fixture
+def session(coat):
+    assert bpy.ops.skinwright.preview_match() == {"FINISHED"}
+    yield import_module(f"{PACKAGE}.match_session").current
+    if bpy.context.scene.skinwright.overlay.kind == "MATCH":
+        bpy.ops.skinwright.preview_match()
+
+
+def params():
+    return bpy.context.scene.skinwright.transfer.to_params()
+
+
+def counts(session):
+    return session.match(params()).counts().tolist()
+
+
+def test_preview_leaves_weights_and_groups_alone(coat, session):
+    assert builders.weights(coat) == [{}] * 84
+    assert not coat.vertex_groups
+
+
+def test_categories(session):
+    z = session.garment.geometry.positions[:, 2]
+    match = session.match(params())
+    assert match.category.tolist() == np.select([z < 0.1, z < 0.6], [0, 1], 4).tolist()
+
+
+def test_sliders_only_threshold(session):
+    assert counts(session) == [45, 36, 0, 0, 3]
+    bpy.context.scene.skinwright.transfer.max_distance = 0.6
+    assert counts(session) == [81, 0, 0, 0, 3]
+
+
+def test_the_mask_decides(coat, session):
+    coat.skinwright.mask_group = "Match Mask"
+    builders.paint(coat, **{"Match Mask": [0.0] * 9 + [0.5] * 72 + [1.0] * 3})
+    assert session.read_mask(coat)
+    assert counts(session) == [40, 32, 3, 9, 0]
+    assert not session.read_mask(coat)
+
+
+def test_second_press_turns_it_off(coat, session):
+    bpy.ops.skinwright.preview_match()
+    assert bpy.context.scene.skinwright.overlay.kind == "NONE"
+    assert import_module(f"{PACKAGE}.match_session").current is None
+
+
+@pytest.mark.parametrize(("what", "number"), [("UNMATCHED", 39), ("MATCHED", 45), ("LOOSE", 3)])
+def test_select(coat, session, what, number):
+    bpy.ops.skinwright.select_match(what=what)
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert sum(vertex.select for vertex in coat.data.vertices) == number
+
+
+def test_select_islands_of_the_selected(coat, session):
+    for vertex in coat.data.vertices:
+        vertex.select = vertex.index == 82
+    bpy.ops.skinwright.select_match(what="ISLAND")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [vertex.index for vertex in coat.data.vertices if vertex.select] == [81, 82, 83]
+
+
+def test_attributes(coat, session):
+    bpy.ops.skinwright.store_match()
+    attributes = coat.data.attributes
+    matched = [entry.value for entry in attributes["skinwright_matched"].data]
+    assert matched == (session.garment.geometry.positions[:, 2] < 0.1).tolist()
+    distance = [entry.value for entry in attributes["skinwright_distance"].data]
+    assert distance == pytest.approx(session.garment.geometry.positions[:, 2].tolist(), abs=1e-6)
+    assert attributes["skinwright_angle"].domain == "POINT"
+
+
+def mask_values(coat):
+    return [row["Match Mask"] for row in builders.weights(coat)]
+
+
+def edit(action, **more):
+    assert bpy.ops.skinwright.edit_match_mask(action=action, **more) == {"FINISHED"}
+
+
+def test_a_fresh_mask_changes_nothing(coat, session):
+    before = counts(session)
+    edit("CLEAR")
+    assert set(mask_values(coat)) == {0.5}
+    session.read_mask(coat)
+    assert counts(session) == before
+
+
+def test_from_match(coat, session):
+    edit("FROM_MATCH")
+    assert mask_values(coat) == (session.garment.geometry.positions[:, 2] < 0.1).astype(float).tolist()
+
+
+def test_selection_grow_shrink_invert(coat, session):
+    edit("CLEAR")
+    for vertex in coat.data.vertices:
+        vertex.select = vertex.index == 40
+    edit("FROM_SELECTION", value="INPAINT")
+    edit("GROW")
+    assert {i for i, value in enumerate(mask_values(coat)) if value == 0} == {31, 39, 40, 41, 49}
+    edit("SHRINK")
+    assert {i for i, value in enumerate(mask_values(coat)) if value == 0} == {40}
+    edit("INVERT")
+    assert mask_values(coat)[40] == 1 and mask_values(coat)[0] == 0.5
+
+
+def test_another_tools_mask_is_not_edited(coat, session):
+    builders.paint(coat, Other=0.3)
+    coat.skinwright.mask_group, coat.skinwright.mask_reading = "Other", "PAINTED"
+    with pytest.raises(RuntimeError, match="set Reading to Steer"):
+        edit("CLEAR")
+
+
+class TestPainting:
+    """What the modal operator does between events."""
+
+    @pytest.fixture
+    def painting(self, coat):
+        builders.paint(coat, Arm__L=0.3, Old=0.7)
+        coat.vertex_groups.active_index = 1
+        self.before = builders.weights(coat)
+        mask_painting = import_module(f"{PACKAGE}.mask_painting")
+        return mask_painting.MaskPainting(bpy.context, coat, params())
+
+    def settle(self, painting):
+        changes = import_module(f"{PACKAGE}.scene.changes")
+        bpy.context.view_layer.update()
+        changes.version += 1
+        for _ in range(2000):
+            if painting.tick(params(), True):
+                return
+            import time
+
+            time.sleep(0.002)
+        raise AssertionError("nothing was solved")
+
+    def test_begins_in_weight_paint_mode_on_the_mask(self, coat, painting):
+        assert coat.mode == "WEIGHT_PAINT"
+        assert coat.vertex_groups.active.name == "Match Mask"
+        painting.cancel(bpy.context)
+
+    def test_weights_follow_the_mask(self, coat, painting):
+        self.settle(painting)
+        first = builders.weights(coat)
+        transfer = import_module(f"{PACKAGE}.transfer").transfer_weights
+        coat.vertex_groups["Match Mask"].add(list(range(9)), 0.0, "REPLACE")
+        self.settle(painting)
+        painting.finish(bpy.context)
+        followed = builders.weights(coat)
+        assert followed != first
+        transfer(bpy.context, bpy.context.scene.skinwright.transfer.source, [coat], params())
+        assert builders.weights(coat) == followed
+
+    def test_finish_restores_mode_group_and_overlay(self, coat, painting):
+        painting.finish(bpy.context)
+        assert coat.mode == "OBJECT"
+        assert coat.vertex_groups.active.name == "Old"
+        assert bpy.context.scene.skinwright.overlay.kind == "NONE"
+        assert coat.skinwright.mask_group == "Match Mask"
+
+    def test_cancel_restores_everything_bit_for_bit(self, coat, painting):
+        self.settle(painting)
+        assert builders.weights(coat) != self.before
+        painting.cancel(bpy.context)
+        assert builders.weights(coat) == self.before
+        assert [group.name for group in coat.vertex_groups] == ["Arm.L", "Old"]
+        assert coat.skinwright.mask_group == ""
+        assert coat.mode == "OBJECT"
+
+    def test_a_mask_without_any_match_leaves_weights_and_says_why(self, coat, painting):
+        self.settle(painting)
+        before = builders.weights(coat)
+        coat.vertex_groups["Match Mask"].add(list(range(84)), 0.0, "REPLACE")
+        with pytest.raises(AssertionError, match="nothing was solved"):
+            self.settle(painting)
+        assert "Coat" in painting.problem
+        after = builders.weights(coat)
+        assert [row["Arm.L"] for row in after] == [row["Arm.L"] for row in before]
+        painting.cancel(bpy.context)
