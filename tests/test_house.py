@@ -49,7 +49,7 @@ MAY_IMPORT = {
     },
     "ui": {"jobs", "match_session", "native", "preview", "properties", "sculpt_session", "ui"},
     "sculpt_replay": {"native", "reporting", "scene", "sculpt_session"},
-    "command_line": {"native", "reporting", "scene", "sculpt_replay", "transfer"},
+    "command_line": {"native", "reporting", "scene", "sculpt_replay", "sculpt_session", "transfer"},
     "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
 }
 MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}

@@ -61,12 +61,8 @@ def _solve(
     locked = ~deforming | np.isin(names, sorted(vertex_groups.locked(obj)))
     shape = {}
     if params.method == "surface":
-        segments = armature.segments(obj, rig, names)
-        shape = {
-            "positions": mesh.rest_positions(obj.data),
-            "triangles": mesh.triangles(obj),
-            "bone_segments": segments,
-        }
+        shape["positions"], shape["triangles"] = mesh.rest_positions(obj.data), mesh.triangles(obj)
+        shape["bone_segments"] = armature.segments(obj, rig, names)
     parents = armature.parents(rig, names)
     options = {"n": params.n, "method": params.method, "locked": locked, "threads": params.threads}
     return native.desparsify(obj.name, before, len(names), parents, **options, **shape)

@@ -107,6 +107,10 @@ class SculptReport:
         reached = f", {sum(self.reachability) / len(self.reachability):.0%} reached" if self.reachability else ""
         return f"{self.target}: {strokes} changed the weights of {self.vertices} vertices{reached}{keys}"
 
+    def all_warnings(self) -> list[str]:
+        """Sentences worth a look."""
+        return self.warnings
+
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return _plain(vars(self)) | {"sentence": self.sentence()}

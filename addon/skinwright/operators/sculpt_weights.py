@@ -13,7 +13,7 @@ from bpy.props import BoolProperty
 from bpy.types import Context, Event, Object, Operator
 
 from .. import native, preferences, sculpt_session
-from ..scene import changes, sculpting
+from ..scene import changes, mesh, sculpting
 from ..scene.error import SceneError
 from ..sculpt_session import SculptSession
 
@@ -111,22 +111,26 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
 
     def _end(self, context: Context, keep: bool) -> set[str]:
         session = sculpt_session.current
-        if not self._left and context.mode == "SCULPT":
-            _take_back_steps(context, session.target_name)
+        if context.mode == "SCULPT":
+            self._look(context)  # a stroke may have ended just now
+            if not self._left:
+                _take_back_steps(context, session.target_name)
         self.cancel(context)
-        session.target().skinwright.sculpting = False
-        if keep:
-            session.assert_state()
-            report = session.commit()
-            self.report({"INFO"}, report.sentence())
-            for warning in report.warnings:
-                self.report({"WARNING"}, warning)
-        else:
-            session.cancel()
+        with mesh.object_mode(context):
+            session.target().skinwright.sculpting = False
+            self._keep(session) if keep else session.cancel()
+        if not keep:
             self.report({"INFO"}, "Weights and shape are as they were")
         if context.mode == "SCULPT" and self._mode != "SCULPT":
             bpy.ops.object.mode_set(mode=self._mode)
         return {"FINISHED" if keep else "CANCELLED"}
+
+    def _keep(self, session: SculptSession) -> None:
+        session.assert_state()
+        report = session.commit()
+        self.report({"INFO"}, report.sentence())
+        for warning in report.warnings:
+            self.report({"WARNING"}, warning)
 
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits: then there is nothing to restore."""

@@ -11,7 +11,7 @@ from . import mesh as scene_mesh
 def add(
     obj: bpy.types.Object, name: str, vertices: NDArray[np.integer], offsets: NDArray[np.float32]
 ) -> bpy.types.ShapeKey:
-    """A key that moves `vertices` (n,) by `offsets` (n, 3) at rest; the Basis is made where missing and stays active."""
+    """A key that moves `vertices` (n,) by `offsets` (n, 3) at rest; the Basis, made where missing, stays active."""
     if not obj.data.shape_keys:
         obj.shape_key_add(name="Basis", from_mix=False)
     basis = obj.data.shape_keys.reference_key
@@ -27,7 +27,7 @@ def add(
 def drive(key: bpy.types.ShapeKey, armature: bpy.types.Object, bone: str, rotation: Quaternion) -> None:
     """Let `key` be 0 at rest and 1 where `bone` has this local rotation, against its turn the same way.
 
-    The value is the joint's quaternion vector along that of the sculpted pose, |q_pose . q| / |q_pose|^2 between 0 and 1.
+    The value is the joint's quaternion vector along that of the sculpted pose, q_pose . q / |q_pose|^2, from 0 to 1.
     The expression is one of Blender's simple ones: it needs no permission to run scripts.
     """
     axis = np.array(rotation if rotation.w >= 0 else -rotation)[1:]
