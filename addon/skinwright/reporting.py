@@ -90,7 +90,7 @@ class DesparsifyReport:
 
 @dataclass(frozen=True)
 class SculptReport:
-    """A session that is over; `reachability` is that of its strokes, first to last."""
+    """A session that is over; `reachability` is of each stroke, how much weights did of what was still to be done."""
 
     target: str
     strokes: int
@@ -104,8 +104,7 @@ class SculptReport:
         """The line the artist reads."""
         strokes = f"{self.strokes} stroke{'s' * (self.strokes != 1)} in {self.poses} pose{'s' * (self.poses != 1)}"
         keys = f", the rest in {', '.join(self.shape_keys)}" if self.shape_keys else ""
-        reached = f", {sum(self.reachability) / len(self.reachability):.0%} reached" if self.reachability else ""
-        return f"{self.target}: {strokes} changed the weights of {self.vertices} vertices{reached}{keys}"
+        return f"{self.target}: {strokes} changed the weights of {self.vertices} vertices{keys}"
 
     def all_warnings(self) -> list[str]:
         """Sentences worth a look."""

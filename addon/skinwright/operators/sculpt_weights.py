@@ -55,7 +55,8 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         SKINWRIGHT_OT_sculpt_weights.asked_to_end = ""
-        self._left, self._seen, self._undone = False, changes.version, changes.undone
+        self._steps_to_undo, self._left = False, False
+        self._seen, self._undone = changes.version, changes.undone
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         window_manager.modal_handler_add(self)
@@ -96,9 +97,11 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             session.set_strength(context.scene.skinwright.sculpt.kappa)
             outcome = session.stroke()
         except (SceneError, native.NativeError) as error:
+            self._steps_to_undo = True
             self.report({"WARNING"}, str(error))
             return
         if outcome:
+            self._steps_to_undo = True
             _show(context, f"{outcome.vertices} vertices, {outcome.reachability:.0%} reached")
 
     def _step(self, context: Context, asked: str) -> None:
@@ -113,7 +116,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
         session = sculpt_session.current
         if context.mode == "SCULPT":
             self._look(context)  # a stroke may have ended just now
-            if not self._left:
+            if self._steps_to_undo and not self._left:
                 _take_back_steps(context, session.target_name)
         self.cancel(context)
         with mesh.object_mode(context):

@@ -45,16 +45,18 @@ def positions() -> np.ndarray:
     return np.array([vertex.co for vertex in bpy.data.objects["Body"].data.vertices], np.float32)
 
 
-def brush(window: Window, name: str = "Draw") -> None:
-    """Debian's 4.3 comes without brushes."""
+def brush(window: Window) -> None:
+    """A brush that grabs; made here, as Debian's 4.3 comes without brushes."""
     with window.context():
         settings = bpy.context.tool_settings
-        if settings.sculpt.brush is None:
-            bpy.data.brushes.new(name, mode="SCULPT").asset_mark()
-            bpy.ops.brush.asset_activate(asset_library_type="LOCAL", relative_asset_identifier=f"Brush/{name}")
+        if "Test Grab" not in bpy.data.brushes:
+            grab = bpy.data.brushes.new("Test Grab", mode="SCULPT")
+            setattr(grab, "sculpt_brush_type" if bpy.app.version >= (5, 0, 0) else "sculpt_tool", "GRAB")
+            grab.asset_mark()
+        bpy.ops.brush.asset_activate(asset_library_type="LOCAL", relative_asset_identifier="Brush/Test Grab")
         unified = getattr(settings.sculpt, "unified_paint_settings", None) or settings.unified_paint_settings
         unified.use_unified_size = True
-        unified.size = 45
+        unified.size = 70
 
 
 def begin(window: Window, desparsify: bool = True) -> Steps:
