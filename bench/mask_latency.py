@@ -23,7 +23,7 @@ def main(sizes: list[str]) -> None:
         record = blender.run("latency", *sizes, timeout=400, size=(800, 600))
         print(f"\nBlender {record.pop('version')}\n")
         print(
-            "| vertices | first solve | solve and write | weights written after release | drawn after release | overlay made |"
+            "| vertices | first solve | solve and write | written after release | drawn after release | overlay made |"
         )
         print("|---|---|---|---|---|---|")
         for vertices, figures in record.items():

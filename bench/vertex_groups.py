@@ -9,14 +9,17 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "addon"))
 
-import bmesh  # there only once bpy is loaded
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 from skinwright.csr import Rows
 from skinwright.scene import deform_array, vertex_groups
 
@@ -39,11 +42,16 @@ def make_rows(n: int, seed: int, shift: int = 0) -> Rows:
     bones = np.sort((first[:, None] + np.array([0, 1, 7, 13])) % GROUPS, axis=1).astype(np.uint32)
     values = np.random.default_rng(seed).random((n, INFLUENCES), np.float32) + np.float32(0.01)
     values /= values.sum(1, keepdims=True)
-    indptr = np.arange(n + 1, dtype=np.uint32) * INFLUENCES
-    return Rows(indptr, bones.ravel(), values.ravel())
+    return Rows(row_starts(n), bones.ravel(), values.ravel())
+
+
+def row_starts(n: int) -> NDArray[np.uint32]:
+    return (np.arange(n + 1) * INFLUENCES).astype(np.uint32)
 
 
 def read_by_bmesh(obj: bpy.types.Object) -> None:
+    import bmesh  # there only once bpy is loaded
+
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)
     layer = mesh.verts.layers.deform.active
@@ -52,6 +60,8 @@ def read_by_bmesh(obj: bpy.types.Object) -> None:
 
 
 def write_by_bmesh(obj: bpy.types.Object, rows: Rows) -> None:
+    import bmesh
+
     vertex_groups.ensure(obj, NAMES)
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)
@@ -66,89 +76,92 @@ def write_by_bmesh(obj: bpy.types.Object, rows: Rows) -> None:
     mesh.free()
 
 
-def by_api(work: Callable[[], object]) -> object:
-    """The same with the memory views refused, as on a Blender they do not fit."""
+@contextmanager
+def public_api_only() -> Iterator[None]:
+    """With the memory views refused, as on a Blender they do not fit."""
     deform_array.open_array = lambda mesh, indices: None
     try:
-        return work()
+        yield
     finally:
         deform_array.open_array = open_array
 
 
-def seconds(work: Callable[[], object], prepare: Callable[[], object]) -> float:
-    prepare()
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
+WAYS: dict[str, Callable[[], AbstractContextManager]] = {"ours": nullcontext, "public API": public_api_only}
 
 
-def measure(n: int) -> dict[str, dict[str, float]]:
-    """Task -> way -> median seconds."""
-    obj = make_object(n)
+@dataclass(frozen=True)
+class Task:
+    """`prepare` is not timed; `bmesh` is Blender's other way, where it has one."""
+
+    name: str
+    n_vertices: int
+    prepare: Callable[[], object]
+    ours: Callable[[], object]
+    bmesh: Callable[[], object] | None = None
+
+
+def make_tasks(obj: bpy.types.Object) -> list[Task]:
+    n = len(obj.data.vertices)
     rows, others, moved = make_rows(n, 0), make_rows(n, 1), make_rows(n, 2, shift=1)
-    some = np.sort(np.random.default_rng(3).choice(n, min(CHANGED, n), replace=False))
-    patch = make_rows(len(some), 4)
     check_equal(obj, rows, others)
+    some = np.sort(np.random.default_rng(3).choice(n, min(CHANGED, n), replace=False))
+    same, patch = patch_of(rows, some), make_rows(len(some), 4)
 
     def clear() -> None:
         obj.vertex_groups.clear()
 
-    def filled() -> None:
+    def fill() -> None:
         clear()
         vertex_groups.write(obj, NAMES, rows)
 
-    tasks = {
-        "read all": (filled, lambda: vertex_groups.read(obj, NAMES), lambda: read_by_bmesh(obj)),
-        "write all, none before": (
-            clear,
-            lambda: vertex_groups.write(obj, NAMES, rows),
-            lambda: write_by_bmesh(obj, rows),
-        ),
-        "write all, same bones": (
-            filled,
-            lambda: vertex_groups.write(obj, NAMES, others),
-            lambda: write_by_bmesh(obj, others),
-        ),
-        "write all, other bones": (
-            filled,
-            lambda: vertex_groups.write(obj, NAMES, moved),
-            lambda: write_by_bmesh(obj, moved),
-        ),
-        f"write {CHANGED}, same bones": (
-            filled,
-            lambda: vertex_groups.write(obj, NAMES, patch_of(rows, some), some),
-            None,
-        ),
-        f"write {CHANGED}, any bones": (filled, lambda: vertex_groups.write(obj, NAMES, patch, some), None),
-    }
-    result = {}
-    for task, (prepare, ours, peer) in tasks.items():
-        ways = {"ours": ours, "public API": lambda ours=ours: by_api(ours)} | ({"bmesh": peer} if peer else {})
-        rounds = ROUNDS if n <= 200_000 else 3
-        times = {way: [] for way in ways}
-        for _ in range(rounds):
-            for way, work in ways.items():
-                times[way].append(seconds(work, prepare))
-        result[task] = {way: statistics.median(values) for way, values in times.items()}
-    mesh = obj.data
-    bpy.data.objects.remove(obj)
-    bpy.data.meshes.remove(mesh)
-    return result
+    def task(name: str, prepare: Callable[[], object], new: Rows) -> Task:
+        ours = partial(vertex_groups.write, obj, NAMES, new)
+        return Task(name, n, prepare, ours, partial(write_by_bmesh, obj, new))
+
+    return [
+        Task("read all", n, fill, partial(vertex_groups.read, obj, NAMES), partial(read_by_bmesh, obj)),
+        task("write all, none before", clear, rows),
+        task("write all, same bones", fill, others),
+        task("write all, other bones", fill, moved),
+        Task("write some, same bones", len(some), fill, partial(vertex_groups.write, obj, NAMES, same, some)),
+        Task("write some, any bones", len(some), fill, partial(vertex_groups.write, obj, NAMES, patch, some)),
+    ]
+
+
+def seconds(work: Callable[[], object], task: Task, way: Callable[[], AbstractContextManager]) -> float:
+    task.prepare()
+    with way():
+        start = time.perf_counter()
+        work()
+        return time.perf_counter() - start
+
+
+def measure(task: Task) -> dict[str, float]:
+    """Way -> median seconds."""
+    times: dict[str, list[float]] = {}
+    for _ in range(ROUNDS if task.n_vertices <= 200_000 else 3):
+        for name, way in WAYS.items():
+            times.setdefault(name, []).append(seconds(task.ours, task, way))
+        if task.bmesh:
+            times.setdefault("bmesh", []).append(seconds(task.bmesh, task, nullcontext))
+    return {name: statistics.median(values) for name, values in times.items()}
 
 
 def patch_of(rows: Rows, some: np.ndarray) -> Rows:
     """The rows of some vertices with their values turned round."""
     bones = rows.bones.reshape(-1, INFLUENCES)[some]
     values = rows.values.reshape(-1, INFLUENCES)[some, ::-1]
-    return Rows(np.arange(len(some) + 1, dtype=np.uint32) * INFLUENCES, bones.ravel(), values.ravel())
+    return Rows(row_starts(len(some)), bones.ravel(), values.ravel())
 
 
 def check_equal(obj: bpy.types.Object, rows: Rows, others: Rows) -> None:
     for wanted in (rows, others):
-        for way in (lambda work: work(), by_api):
-            way(lambda wanted=wanted: vertex_groups.write(obj, NAMES, wanted))
-            for read_way in (lambda work: work(), by_api):
-                got = read_way(lambda: vertex_groups.read(obj, NAMES))
+        for writing in WAYS.values():
+            with writing():
+                vertex_groups.write(obj, NAMES, wanted)
+            for reading in WAYS.values():
+                with reading():
+                    got = vertex_groups.read(obj, NAMES)
                 assert all(np.array_equal(a, b) for a, b in zip(got, wanted, strict=True))
 
 
@@ -156,11 +169,14 @@ def main(sizes: list[int]) -> None:
     trusted = "memory views in use" if deform_array.find_layout() else "memory views refused"
     print(f"\nBlender {bpy.app.version_string}, numpy {np.__version__}, {trusted}\n")
     print("| task | vertices | ours ms | ours ns/v | public API ns/v | bmesh ns/v |\n|---|---|---|---|---|---|")
-    for n in sizes:
-        for task, ways in measure(n).items():
-            of = min(CHANGED, n) if task.startswith(f"write {CHANGED}") else n
-            cells = [f"{ways[way] / of * 1e9:.0f}" if way in ways else "" for way in ("ours", "public API", "bmesh")]
-            print(f"| {task} | {n} | {ways['ours'] * 1e3:.1f} | {' | '.join(cells)} |", flush=True)
+    for size in sizes:
+        obj = make_object(size)
+        for task in make_tasks(obj):
+            ways = measure(task)
+            cells = [f"{ways[way] / task.n_vertices * 1e9:.0f}" if way in ways else "" for way in (*WAYS, "bmesh")]
+            first = f"| {task.name} | {task.n_vertices} of {size} | {ways['ours'] * 1e3:.1f} | "
+            print(first + " | ".join(cells) + " |", flush=True)
+        bpy.data.meshes.remove(obj.data)
 
 
 if __name__ == "__main__":

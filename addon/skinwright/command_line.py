@@ -57,7 +57,7 @@ def _add_transfer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
     parser.add_argument("--target", required=True, action="append", help="object to transfer to; may be repeated")
-    _add_common(parser, "max_normal_angle in degrees")
+    _add_common(parser, "max_normal_angle in degrees", to_json(TransferParams()))
     parser.set_defaults(work=_transfer, read=from_json, write=to_json, default=TransferParams())
 
 
@@ -65,11 +65,13 @@ def _add_sculpt(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--target", required=True, help="object that was sculpted")
     parser.add_argument("--sculpts", required=True, type=Path, help=".npz file of positions and poses")
-    _add_common(parser, "as the fields of SculptOptions")
+    _add_common(parser, "names as in SculptOptions", vars(SculptOptions()))
     parser.set_defaults(work=_sculpt, read=options_from_json, write=vars, default=SculptOptions())
 
 
-def _add_common(parser: argparse.ArgumentParser, settings: str) -> None:
+def _add_common(parser: argparse.ArgumentParser, settings: str, defaults: dict[str, Any]) -> None:
+    listed = ", ".join(f"{name} {json.dumps(value)}" for name, value in defaults.items())
+    parser.epilog = f"Settings and their defaults: {listed}."
     parser.add_argument("--settings", type=Path, help=f"JSON object of settings; {settings}")
     parser.add_argument("--threads", type=int, help="processor threads, 0 for all")
     parser.add_argument("--report", type=Path, help="write what was done as JSON")

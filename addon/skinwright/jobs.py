@@ -38,7 +38,7 @@ class Runner:
     def poll(self) -> bool:
         """Take a step if the present job has ended; gives whether all is done. Raises what the steps raise."""
         if self._job and self._job.done:
-            self._answer()
+            self._answer(self._job)
         return self.done
 
     def wait(self, seconds: float) -> None:
@@ -54,9 +54,9 @@ class Runner:
         self._steps.close()
         self.done = True
 
-    def _answer(self) -> None:
+    def _answer(self, job: native.Job) -> None:
         try:
-            answer = self._job.result()
+            answer = job.result()
         except native.NativeError:
             self._steps.close()
             raise

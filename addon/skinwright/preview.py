@@ -1,5 +1,6 @@
 """What the overlay shows: a shape, a colour value on each vertex, and the figures of the legend."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -44,7 +45,7 @@ class Picture:
     normals: NDArray[np.float32]
     triangles: NDArray[np.integer]
     values: NDArray[np.number]
-    rows: list[tuple[int, str]]
+    rows: Sequence[tuple[int, str]]
     histograms: list[Histogram] = field(default_factory=list)
     note: str = ""
 
@@ -63,20 +64,21 @@ def forget() -> None:
 def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Picture | None:
     """What to draw now, made anew only when something has changed; None where there is nothing to show."""
     global _kept
-    obj = shown_object(context, kind)
+    session = match_session.current if kind == "MATCH" else None
+    obj = shown_object(context, kind, session)
     if obj is None:
         return None
-    match = _match(obj, params) if kind == "MATCH" else None
+    match = _match(obj, session, params) if session else None
     key = (kind, obj.name, changes.version, id(match))
     if _kept is None or _kept[0] != key:
-        _kept = (key, _make(context, kind, obj, match))
+        _kept = (key, _make(context, kind, obj, session, match))
     return _kept[1]
 
 
-def shown_object(context: bpy.types.Context, kind: str) -> bpy.types.Object | None:
+def shown_object(context: bpy.types.Context, kind: str, session: MatchSession | None) -> bpy.types.Object | None:
     """The target of the match on show, or the active mesh; not in Edit mode, where the mesh is another."""
     if kind == "MATCH":
-        obj = match_session.current.target() if match_session.current else None
+        obj = session.target() if session else None
     else:
         obj = context.object if context.object and context.object.type == "MESH" else None
     return obj if obj and obj.mode != "EDIT" and obj.visible_get() and obj.data.polygons else None
@@ -85,10 +87,9 @@ def shown_object(context: bpy.types.Context, kind: str) -> bpy.types.Object | No
 _seen_version = -1
 
 
-def _match(obj: bpy.types.Object, params: TransferParams) -> Match:
+def _match(obj: bpy.types.Object, session: MatchSession, params: TransferParams) -> Match:
     """While a job solves, the match before it."""
     global _seen_version
-    session = match_session.current
     if _seen_version != changes.version:
         session.read_mask(obj)
         _seen_version = changes.version
@@ -97,7 +98,9 @@ def _match(obj: bpy.types.Object, params: TransferParams) -> Match:
     return session.match(params)
 
 
-def _make(context: bpy.types.Context, kind: str, obj: bpy.types.Object, match: Match | None) -> Picture:
+def _make(
+    context: bpy.types.Context, kind: str, obj: bpy.types.Object, session: MatchSession | None, match: Match | None
+) -> Picture:
     positions, normals, fits = deformation.shown(obj, context.view_layer.depsgraph)
     shape = {
         "kind": kind,
@@ -107,8 +110,8 @@ def _make(context: bpy.types.Context, kind: str, obj: bpy.types.Object, match: M
         "triangles": _triangles_of(obj),
         "note": "" if fits else "Shown at rest: a modifier changes the number of vertices",
     }
-    if match:
-        return _picture_of_match(match, match_session.current, shape)
+    if session and match:
+        return _picture_of_match(match, session, shape)
     if kind == "INFLUENCES":
         return _picture_of_influences(obj, shape)
     values = deformation.stretch(mesh.edges(obj), mesh.rest_positions(obj.data), positions)

@@ -144,7 +144,6 @@ def transfer_weights(
     island_policy: IslandPolicy = "bridge",
     threads: int = 0,
 ) -> Transfer: ...
-
 def linear_blend(
     rest_positions: ArrayLike, weights: Weights, pose_from_rest: ArrayLike, *, threads: int = 0
 ) -> NDArray[np.float32]:
@@ -201,10 +200,10 @@ class Stroke:
 class SculptSolver:
     """A character prepared for strokes: candidates, poses, and what each vertex was sculpted to in each of them.
 
-    All positions and matrices are in the mesh' own space. The members of a vertex (zero weights too, 12 at most) are its
-    candidates; strokes never add or drop one. `locked` (B,) bool bones keep their weights. `kappa` pulls towards the
-    weights before a stroke, relative to the rest diagonal: 0.001 follows the sculpt, 0.05 hardly moves; `passes` of that
-    pull, each starting from the last, take its bias away. Unweighted vertices stay unweighted.
+    All positions and matrices are in the mesh' own space. The members of a vertex (zero weights too, 12 at most) are
+    its candidates; strokes never add or drop one. `locked` (B,) bool bones keep their weights. `kappa` pulls towards
+    the weights before a stroke, relative to the rest diagonal: 0.001 follows the sculpt, 0.05 hardly moves; `passes`
+    of that pull, each starting from the last, take its bias away. Unweighted vertices stay unweighted.
     """
 
     def __new__(
@@ -237,8 +236,8 @@ class SculptSolver:
 
     def clear_guards(self) -> None: ...
     def posed(self, vertices: ArrayLike, rest_positions: ArrayLike, *, pose: int | None = None) -> NDArray[np.float32]:
-        """Where `rest_positions` (n, 3), one for each of `vertices` (n,), lie in a pose under the present weights. For a
-        brush that moves rest positions, these are the targets of its stroke. `pose`: None for the one added last."""
+        """Where `rest_positions` (n, 3), one for each of `vertices` (n,), lie in a pose under the present weights. For
+        a brush that moves rest positions, these are the targets of its stroke. `pose`: None for the one added last."""
 
     def stroke(self, vertices: ArrayLike, targets: ArrayLike, *, pose: int | None = None) -> Stroke:
         """Takes `targets` (n, 3), the sculpted positions of `vertices` (n,) in a pose, into memory and solves for these

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import quadprog
 import skinwright_native as native
+import thesis
 
 PULL = 0.05
 CASES = 13_000  # of each family, 104,000 in all
@@ -76,30 +77,6 @@ def test_the_solver_agrees_with_quadprog_on_other_sizes(n):
     np.testing.assert_allclose(native.simplex_qp(h, g, start), peer, rtol=0, atol=1e-9)
 
 
-def thesis(d: np.ndarray, target: np.ndarray, old: np.ndarray, k: float = 0.05, h: float = 1.2) -> np.ndarray:
-    """The thesis' own solver (6.4.3, 7.6.2, 7.6.3), kept as the reference that the exact one must beat."""
-    free, p = d[:, :3] - d[:, 3:], target - d[:, 3]
-    a = free.T @ free + k * k * (np.eye(3) + np.ones((3, 3)))
-    b = free.T @ p + k * k * (old[:3] - old[3] + 1)
-
-    def minimiser():
-        w = np.linalg.solve(a, b)
-        return np.append(w, 1 - w.sum())
-
-    w = minimiser()
-    for j in range(3):
-        if w[j] < -1.2e-8:
-            a[j, j] += h
-            w = minimiser()
-    if w[3] < -1.2e-8:
-        a += h
-        b += h
-        w = minimiser()
-    low, high = min(0, w.min()), max(1, w.max())
-    w = (w - low) / (high - low)
-    return w / w.sum()
-
-
 @pytest.mark.parametrize("scale", [0.1, 1.0, 10.0, 100.0])
 def test_no_vertex_ends_farther_whatever_the_scale_unlike_in_the_thesis(scale):
     """Each vertex has bones of its own that only shift it, so that d is any point (spec-sculpt, section 2)."""
@@ -121,7 +98,7 @@ def test_no_vertex_ends_farther_whatever_the_scale_unlike_in_the_thesis(scale):
     assert (after <= before + 1e-5 * scale).all()
     np.testing.assert_allclose(np.linalg.norm(stroke.residuals, axis=1), after, atol=1e-5 * scale)
     np.testing.assert_allclose(stroke.reachability, 1 - np.linalg.norm(after) / np.linalg.norm(before), atol=1e-5)
-    reference = left(np.array([thesis(d[p], target[p], old[p].astype(float)) for p in range(count)]))
+    reference = left(np.array([thesis.solve(d[p], target[p], old[p].astype(float)) for p in range(count)]))
     assert after.mean() < reference.mean()
     if scale >= 1:
         assert (reference > before).mean() > 0.1

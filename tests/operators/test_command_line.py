@@ -196,5 +196,7 @@ class TestInThisProcess:
         assert addon.command_line.main(["transfer", "--source", "Body", "--target", "Coat"]) == 0
         assert addon.command_line.main(["--version"]) == 0
         assert addon.native.addon_version() in capsys.readouterr().out
+        assert addon.command_line.main(["transfer", "--help"]) == 0
+        assert 'island_policy "bridge"' in " ".join(capsys.readouterr().out.split())
         assert addon.command_line.main([]) == 2
         assert addon.command_line.main(["dance"]) == 2

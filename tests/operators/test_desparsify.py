@@ -1,4 +1,4 @@
-"""The desparsify operator: members of weight 0, locks, groups that are no bones, subsets, undo of nothing on refusal."""
+"""The desparsify operator: members of weight 0, locks, groups that are no bones, subsets, refusals."""
 
 import builders
 import numpy as np

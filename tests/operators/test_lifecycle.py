@@ -50,6 +50,12 @@ def test_enabling_and_disabling_leaves_no_trace(addon):
     extension.enable()
 
 
+@pytest.mark.parametrize("menu", ["VIEW3D_MT_paint_weight", "VIEW3D_MT_make_links"])
+def test_menu_entries(addon, menu):
+    drawn = getattr(bpy.types, menu).draw._draw_funcs
+    assert [f.__module__ for f in drawn].count(f"{addon.__name__}.ui.menus") == 1
+
+
 def test_the_command_is_taken_away(addon, monkeypatch):
     """Blender has no list of commands to look into: see what is asked of it."""
     taken_away = []

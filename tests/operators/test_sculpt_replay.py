@@ -79,7 +79,7 @@ def test_the_true_weights_come_back(recorded, tmp_path):
 
 
 def test_frames(recorded, tmp_path, addon):
-    blend, sculpts, true = recorded
+    _, sculpts, true = recorded
     body = bpy.data.objects["Body"]
     bone = body.modifiers["Armature"].object.pose.bones["Arm.L"]
     for frame, angle in zip((10, 20), ANGLES, strict=True):

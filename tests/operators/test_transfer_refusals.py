@@ -207,7 +207,7 @@ class TestTarget:
 
 @pytest.mark.parametrize("flaw", [float("nan"), -0.5, 0.5])
 def test_an_answer_that_is_no_set_of_weights_is_not_written(addon, body, coat, monkeypatch, flaw):
-    real = addon.native.Source.transfer
+    real = addon.native.Job.result
 
     def flawed(*arguments, **keywords):
         transfer, rows = real(*arguments, **keywords)
@@ -215,7 +215,7 @@ def test_an_answer_that_is_no_set_of_weights_is_not_written(addon, body, coat, m
         values[rows.indptr[7]] += flaw
         return transfer, rows._replace(values=values)
 
-    monkeypatch.setattr(addon.native.Source, "transfer", flawed)
+    monkeypatch.setattr(addon.native.Job, "result", flawed)
     refused("Coat: the answer is no set of weights", coat)
 
 

@@ -1,4 +1,4 @@
-"""The views of Blender's memory agree with its API, stay out of what shares the memory, and refuse what they mistrust."""
+"""Views of Blender's memory agree with its API, do not touch what shares the memory, and refuse what they mistrust."""
 
 from dataclasses import replace
 from importlib import import_module

@@ -198,5 +198,19 @@ def test_selected_and_other_users(mesh):
     assert mesh.other_users(obj) == [other.name]
 
 
+def test_painting_with_a_face_mask_its_faces_are_selected(mesh):
+    obj = builders.grid("Garment", 3)
+    obj.data.vertices.foreach_set("select", np.zeros(9, bool))
+    builders.select(obj)
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    obj.data.use_paint_mask = True
+    obj.data.polygons.foreach_set("select", [False, True, False, False])
+    assert np.flatnonzero(mesh.selected(obj)).tolist() == [1, 2, 4, 5]
+    obj.data.use_paint_mask = False
+    obj.data.vertices.foreach_set("select", np.arange(9) == 8)
+    assert np.flatnonzero(mesh.selected(obj)).tolist() == [8]
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def test_size(mesh):
     assert mesh.read(builders.grid("Garment", 3, size=3.0)).size == pytest.approx(Vector((3, 3, 0)))

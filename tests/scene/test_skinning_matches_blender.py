@@ -1,5 +1,7 @@
 """Our linear blend skinning puts every vertex where Blender's Armature modifier does."""
 
+import itertools
+
 import builders
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ def chain(name: str = "Rig") -> bpy.types.Object:
     """Three bones along x, each hanging on the one before."""
     rig = builders.rig(name, bones=BONES, controls=())
     bpy.ops.object.mode_set(mode="EDIT")
-    for before, after in zip(BONES[:-1], BONES[1:], strict=True):
+    for before, after in itertools.pairwise(BONES):
         rig.data.edit_bones[after].parent = rig.data.edit_bones[before]
     bpy.ops.object.mode_set(mode="OBJECT")
     return rig

@@ -1,8 +1,10 @@
 """Edit Match Mask: fill, grow, shrink, invert, clear, and set from the selection."""
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty
 from bpy.types import Context, Operator
+from numpy.typing import NDArray
 
 from .. import match_session, native
 from ..scene import mask, mesh
@@ -72,7 +74,7 @@ class SKINWRIGHT_OT_edit_match_mask(Operator):
             return (mask.grow if self.action == "GROW" else mask.shrink)(values, mesh.edges(obj))
         return 1 - values if self.action == "INVERT" else mask.cleared(values)
 
-    def _matched(self, context: Context):
+    def _matched(self, context: Context) -> NDArray[np.bool_]:
         session = match_session.current_of(target(context)) or begin(context)
         return session.matched(session.match(context.scene.skinwright.transfer.to_params()))
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bpy.types import Context, Event
+from bpy.types import Context, Event, Operator
 
 from .. import jobs, native
 from ..scene.error import SceneError
@@ -10,8 +10,12 @@ from ..scene.error import SceneError
 TICK_SECONDS = 0.05
 
 
-class LongWork:
-    """Mix-in for an operator: `begin` starts the work, `complete` gets what it gave."""
+class LongWork(Operator):
+    """Base of an operator: `begin` starts the work, `complete` gets what it gave."""
+
+    def complete(self, context: Context, result: Any) -> set[str]:
+        """Say what was done."""
+        raise NotImplementedError
 
     def begin(self, context: Context, steps: jobs.Jobs[Any]) -> set[str]:
         """Start; what is done by then is completed at once."""
@@ -22,7 +26,7 @@ class LongWork:
             return {"CANCELLED"}
         if runner.done:
             return self.complete(context, runner.result)
-        jobs.running = runner
+        self._runner = jobs.running = runner
         window_manager = context.window_manager
         self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         window_manager.modal_handler_add(self)
@@ -31,7 +35,7 @@ class LongWork:
 
     def modal(self, context: Context, event: Event) -> set[str]:
         """Everything but Esc waits: the scene must not change between reading and writing."""
-        runner = jobs.running
+        runner = self._runner
         if event.type == "ESC" and event.value == "PRESS":
             self.cancel(context)
             self.report({"INFO"}, "Stopped; nothing was written")
@@ -52,7 +56,7 @@ class LongWork:
 
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits."""
-        jobs.running.cancel()
+        self._runner.cancel()
         self._end(context)
 
     def _end(self, context: Context) -> None:

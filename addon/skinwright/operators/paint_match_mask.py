@@ -7,6 +7,7 @@ from bpy.types import Context, Event, Operator
 from .. import match_session, native, preferences
 from ..mask_painting import MaskPainting
 from ..scene.error import SceneError
+from ..transfer.params import TransferParams
 from .preview_match import refusal, target
 
 TICK_SECONDS = 0.02
@@ -38,7 +39,8 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         cls = SKINWRIGHT_OT_paint_match_mask
-        cls.painting, cls.asked_to_end = painting, ""
+        self._painting = cls.painting = painting
+        cls.asked_to_end = ""
         match_session.current = painting.session
         # Else undoing the first stroke would also undo that painting has begun.
         bpy.ops.ed.undo_push(message=self.bl_label)
@@ -51,7 +53,7 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
     def modal(self, context: Context, event: Event) -> set[str]:
         """Everything but Enter and Esc is the brushes' and the view's."""
         cls = SKINWRIGHT_OT_paint_match_mask
-        if context.mode != "PAINT_WEIGHT" or cls.painting.session.target() != context.object:
+        if context.mode != "PAINT_WEIGHT" or self._painting.session.target() != context.object:
             return self._end(context, keep=True)
         pressed = event.type if event.value == "PRESS" else ""
         if pressed == "ESC" or cls.asked_to_end == "CANCEL":
@@ -63,16 +65,17 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
         return {"PASS_THROUGH"}
 
     def _tick(self, context: Context) -> None:
-        painting = SKINWRIGHT_OT_paint_match_mask.painting
-        if painting.tick(_params(context), context.scene.skinwright.overlay.live):
+        if self._painting.tick(_params(context), context.scene.skinwright.overlay.live):
             for area in context.screen.areas:
                 if area.type == "VIEW_3D":
                     area.tag_redraw()
 
     def _end(self, context: Context, keep: bool) -> set[str]:
-        painting = SKINWRIGHT_OT_paint_match_mask.painting
         self.cancel(context)
-        painting.finish(context) if keep else painting.cancel(context)
+        if keep:
+            self._painting.finish(context)
+        else:
+            self._painting.cancel(context)
         self.report({"INFO"}, "Mask and weights kept" if keep else "All weights are as they were")
         # An undo step in both cases: the last one is a stroke, whose weights are no longer there.
         return {"FINISHED"}
@@ -106,7 +109,7 @@ class SKINWRIGHT_OT_end_match_mask(Operator):
         return {"FINISHED"}
 
 
-def _params(context: Context):
+def _params(context: Context) -> TransferParams:
     return context.scene.skinwright.transfer.to_params(preferences.threads(context))
 
 

@@ -8,10 +8,11 @@ from .. import match_session, native, preferences
 from ..match_session import MatchSession
 from ..scene import attributes, mesh
 from ..scene.error import SceneError
+from ..transfer.params import TransferParams
 
 
-def target(context: Context) -> Object | None:
-    """The active mesh, if it is not the source."""
+def target(context: Context) -> Object:
+    """The active mesh, if it is not the source; else None, which `poll` refuses."""
     obj = context.object
     source = context.scene.skinwright.transfer.source
     return obj if obj and obj.type == "MESH" and obj != source else None
@@ -39,7 +40,7 @@ def begin(context: Context) -> MatchSession:
     return match_session.current
 
 
-class _OnMatch:
+class _OnMatch(Operator):
     """What works on the match of the active mesh, preparing it where there is none on show."""
 
     @classmethod
@@ -49,6 +50,10 @@ class _OnMatch:
         cls.poll_message_set(reason)
         return not reason
 
+    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
+        """Do it, and say what was done."""
+        raise NotImplementedError
+
     def execute(self, context: Context) -> set[str]:
         """Work on the match, or say why there is none."""
         obj = target(context)
@@ -56,14 +61,14 @@ class _OnMatch:
             session = match_session.current_of(obj) or begin(context)
             params = context.scene.skinwright.transfer.to_params()
             session.read_mask(obj)
-            self.report({"INFO"}, self.work(context, session, params))
+            self.report({"INFO"}, self.work(obj, session, params))
         except (SceneError, native.NativeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
 
-class SKINWRIGHT_OT_preview_match(_OnMatch, Operator):
+class SKINWRIGHT_OT_preview_match(_OnMatch):
     """Turns the overlay on, anew for what has changed, and off."""
 
     bl_idname = "skinwright.preview_match"
@@ -80,16 +85,14 @@ class SKINWRIGHT_OT_preview_match(_OnMatch, Operator):
         match_session.current = None
         return super().execute(context)
 
-    def work(self, _context: Context, session: MatchSession, params) -> str:
+    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Shown by the overlay; here in numbers."""
         counts = session.match(params).counts().tolist()
         matched = counts[0] + counts[2]
-        return (
-            f"{session.target_name}: {matched} of {sum(counts)} vertices match, {counts[4]} are in parts without match"
-        )
+        return f"{obj.name}: {matched} of {sum(counts)} vertices match, {counts[4]} are in parts without match"
 
 
-class SKINWRIGHT_OT_select_match(_OnMatch, Operator):
+class SKINWRIGHT_OT_select_match(_OnMatch):
     """Selects in Edit mode, where a selection can be seen and worked with."""
 
     bl_idname = "skinwright.select_match"
@@ -108,9 +111,8 @@ class SKINWRIGHT_OT_select_match(_OnMatch, Operator):
         ],
     )
 
-    def work(self, _context: Context, session: MatchSession, params) -> str:
+    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Go to Edit mode with the vertices selected."""
-        obj = session.target()
         chosen = session.chosen(self.what, session.match(params), mesh.selected(obj))
         if obj.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -120,7 +122,7 @@ class SKINWRIGHT_OT_select_match(_OnMatch, Operator):
         return f"{int(chosen.sum())} vertices of {obj.name} selected"
 
 
-class SKINWRIGHT_OT_store_match(_OnMatch, Operator):
+class SKINWRIGHT_OT_store_match(_OnMatch):
     """For Geometry Nodes."""
 
     bl_idname = "skinwright.store_match"
@@ -128,9 +130,9 @@ class SKINWRIGHT_OT_store_match(_OnMatch, Operator):
     bl_description = "Keep matched, distance and angle as named attributes of the active mesh, for Geometry Nodes"
     bl_options = {"REGISTER", "UNDO"}
 
-    def work(self, _context: Context, session: MatchSession, params) -> str:
+    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Three attributes on vertices."""
-        obj, inpainting = session.target(), session.inpainting
+        inpainting = session.inpainting
         matched = session.matched(session.match(params))
         attributes.write(obj, "skinwright_matched", matched)
         attributes.write(obj, "skinwright_distance", inpainting.distance)

@@ -2,7 +2,7 @@
 
 import bpy
 from bpy.props import BoolProperty
-from bpy.types import Context, Event, Object, Operator
+from bpy.types import Context, Event, Object
 
 from .. import native, preferences
 from ..properties import TransferOptions
@@ -16,7 +16,7 @@ MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
 LONG_WORK_VERTICES = 50_000
 
 
-class SKINWRIGHT_OT_transfer_weights(LongWork, TransferOptions, Operator):
+class SKINWRIGHT_OT_transfer_weights(LongWork, TransferOptions):
     """The operator; all of the work is in the function it calls."""
 
     bl_idname = "skinwright.transfer_weights"

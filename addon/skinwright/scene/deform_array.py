@@ -122,7 +122,7 @@ def read_pointer(address: int) -> int:
 
 
 def as_array(address: int, length: int, dtype: np.dtype) -> np.ndarray:
-    return np.frombuffer((ctypes.c_uint8 * (length * dtype.itemsize)).from_address(address), dtype)
+    return np.frombuffer(memoryview((ctypes.c_uint8 * (length * dtype.itemsize)).from_address(address)), dtype)
 
 
 @cache
@@ -164,8 +164,8 @@ def write_a_file() -> bytes:
 def parse_dna(file: bytes) -> dict[str, dict[str, int]]:
     """Struct name -> member name -> offset in bytes, with the struct's own size as "size".
 
-    The description is four tables, each aligned to 4 bytes from its own start: NAME and TYPE (zero-terminated strings), TLEN (sizes of the
-    types) and STRC (type, number of members, then type and name of each member).
+    The description is four tables, each aligned to 4 bytes from its own start: NAME and TYPE
+    (zero-terminated strings), TLEN (sizes of the types) and STRC (type, number of members, then type and name of each).
     """
     dna = file[file.rindex(b"SDNANAME") :]
     names, at = read_strings(dna, 4, b"NAME")

@@ -80,9 +80,18 @@ def is_sheared(obj: bpy.types.Object) -> bool:
 
 
 def selected(obj: bpy.types.Object) -> NDArray[np.bool_]:
-    """(V,) the vertices selected in Edit mode or by the paint mask."""
-    select = np.empty(len(obj.data.vertices), bool)
-    obj.data.vertices.foreach_get("select", select)
+    """(V,) the vertices selected in Edit mode or by the paint mask, whose faces count while painting."""
+    mesh = obj.data
+    select = np.zeros(len(mesh.vertices), bool)
+    if obj.mode != "WEIGHT_PAINT" or not mesh.use_paint_mask:
+        mesh.vertices.foreach_get("select", select)
+        return select
+    faces, corners = np.empty(len(mesh.polygons), bool), np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("select", faces)
+    mesh.polygons.foreach_get("loop_total", corners)
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    select[vertices[np.repeat(faces, corners)]] = True
     return select
 
 

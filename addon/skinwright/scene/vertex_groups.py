@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import csr
 from ..csr import Rows
 from . import deform_array
 from .error import SceneError
@@ -60,8 +61,11 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     Raises SceneError for a weight that is not a number.
     """
     n = len(obj.data.vertices)
+    indices = [obj.vertex_groups.find(_stored(name)) for name in names]
+    if all(index < 0 for index in indices):
+        return csr.empty(n)
     row, group, values = _memberships(obj.data, np.arange(n))
-    column = _lookup([obj.vertex_groups.find(_stored(name)) for name in names], group)
+    column = _lookup(indices, group)
     keep = column >= 0
     vertex, column, values = row[keep], column[keep], values[keep]
     _check_finite(obj, names, vertex, column, values)

@@ -19,6 +19,13 @@ INFLUENCES = np.array(
 STRETCH = np.array([(0.13, 0.4, 0.67), (0.57, 0.77, 0.87), (0.96, 0.96, 0.96), (0.96, 0.65, 0.51), (0.7, 0.09, 0.17)])
 
 
+def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
+    """(V, 3) of what a preview.Picture of this kind holds."""
+    if kind == "MATCH":
+        return of_categories(values)
+    return of_influences(values) if kind == "INFLUENCES" else of_stretch(values)
+
+
 def of_categories(category: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(V, 3) of categories (V,)."""
     return CATEGORIES[category]

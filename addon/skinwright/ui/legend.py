@@ -5,6 +5,7 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from numpy.typing import ArrayLike
 
 from ..match_session import Category
 from ..preview import Histogram, Picture
@@ -27,12 +28,12 @@ class _Sheet:
         self.left, self.bottom = 70 * self.scale, 30 * self.scale
         self.shader = gpu.shader.from_builtin("UNIFORM_COLOR")
 
-    def rectangles(self, boxes: np.ndarray, colour: tuple[float, ...]) -> None:
+    def rectangles(self, boxes: ArrayLike, colour: tuple[float, ...]) -> None:
         """Boxes (N, 4): x, y, width, height."""
-        boxes = np.asarray(boxes, np.float32).reshape(-1, 4) * self.scale + (self.left, self.bottom, 0, 0)
-        x, y, width, height = boxes.T
+        placed = np.asarray(boxes, np.float32).reshape(-1, 4) * self.scale + (self.left, self.bottom, 0, 0)
+        x, y, width, height = placed.T
         corners = np.stack([x, y, x + width, y, x + width, y + height, x, y + height], axis=1).reshape(-1, 2)
-        first = np.arange(len(boxes))[:, None] * 4
+        first = np.arange(len(placed))[:, None] * 4
         triangles = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
         content = {"pos": np.ascontiguousarray(corners, np.float32)}
         batch = batch_for_shader(self.shader, "TRIS", content, indices=triangles.astype(np.int32))
@@ -59,18 +60,11 @@ def draw(picture: Picture) -> None:
         sheet.text(0, y, picture.note)
         y += LINE
     for value, text in reversed(picture.rows):
-        sheet.rectangles([(0, y, 12, 12)], (*_colour(picture.kind, value), 1.0))
+        sheet.rectangles([(0, y, 12, 12)], (*colours.of_values(picture.kind, np.array([value]))[0], 1.0))
         sheet.text(20, y + 1, text)
         y += LINE
     sheet.text(0, y + 2, f"{TITLES[picture.kind]}: {picture.object_name}")
     gpu.state.blend_set("NONE")
-
-
-def _colour(kind: str, value: int) -> np.ndarray:
-    values = np.array([value])
-    if kind == "MATCH":
-        return colours.of_categories(values)[0]
-    return (colours.of_influences if kind == "INFLUENCES" else colours.of_stretch)(values)[0]
 
 
 def _draw_histogram(sheet: _Sheet, histogram: Histogram, y: float) -> float:

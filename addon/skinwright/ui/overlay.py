@@ -7,7 +7,6 @@ from bpy.app.handlers import load_pre, persistent
 from bpy.types import SpaceView3D
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from .. import preview
 from ..preview import Picture
@@ -21,13 +20,6 @@ _handles: list[object] = []
 _kept: tuple[Picture, float, gpu.types.GPUBatch] | None = None
 
 
-def of_values(picture: Picture) -> NDArray[np.float32]:
-    """(V, 3) the picture's values as colours."""
-    return {"MATCH": colours.of_categories, "INFLUENCES": colours.of_influences, "STRETCH": colours.of_stretch}[
-        picture.kind
-    ](picture.values)
-
-
 def _picture() -> Picture | None:
     context = bpy.context
     settings = context.scene.skinwright.overlay
@@ -39,7 +31,7 @@ def _picture() -> Picture | None:
 def _draw_mesh() -> None:
     picture = _picture()
     obj = bpy.data.objects.get(picture.object_name) if picture else None
-    if obj is None:
+    if picture is None or obj is None:
         return
     batch = _batch(picture, bpy.context.scene.skinwright.overlay.opacity)
     offset = Matrix.Identity(4)
@@ -62,7 +54,7 @@ def _batch(picture: Picture, opacity: float) -> gpu.types.GPUBatch:
         # A little of the light that Solid shading has, or the shape could not be seen.
         shade = 0.72 + 0.28 * np.clip(picture.normals @ LIGHT, -1, 1)
         rgba = np.empty((len(picture.values), 4), np.float32)
-        rgba[:, :3], rgba[:, 3] = of_values(picture) * shade[:, None], opacity
+        rgba[:, :3], rgba[:, 3] = colours.of_values(picture.kind, picture.values) * shade[:, None], opacity
         content = {"pos": picture.positions, "color": rgba}
         shader = gpu.shader.from_builtin("SMOOTH_COLOR")
         _kept = (

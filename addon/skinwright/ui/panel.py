@@ -46,7 +46,9 @@ class SKINWRIGHT_PT_transfer(Tab, Panel):
         """Problems first, as red rows."""
         layout = _settings_column(self.layout)
         if problem():
-            _alert(layout, problem())
+            row = layout.row()
+            row.alert = True
+            row.label(text="The native module cannot be used", icon="ERROR")  # the button's tooltip says why
         settings = context.scene.skinwright.transfer
         layout.prop(settings, "source")
         layout.prop(settings, "groups")
@@ -112,12 +114,6 @@ def _settings_column(layout: UILayout) -> UILayout:
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout.column()
-
-
-def _alert(layout: UILayout, sentence: str) -> None:
-    row = layout.row()
-    row.alert = True
-    row.label(text=sentence, icon="ERROR")
 
 
 CLASSES = (

@@ -1,9 +1,10 @@
 //! The sparse solver against faer's dense Cholesky and against the equation itself.
 
 use faer::linalg::solvers::Solve;
+use faer::sparse::{SparseColMat, Triplet};
 use faer::{Mat, Side};
 use glam::Vec3;
-use skinwright_core::linear_solve::{Cholesky, NotPositive, SymmetricMatrix};
+use skinwright_core::linear_solve::{Cholesky, Method, NotPositive, SymmetricMatrix};
 
 /// A repeatable stream of numbers in [-1, 1).
 struct Noise(u64);
@@ -71,87 +72,262 @@ fn squared_laplacian(n: usize, edges: &[(usize, usize)], strength: f64) -> Symme
     assemble(n, &entries)
 }
 
-fn grid(width: usize, height: usize) -> (SymmetricMatrix, Vec<Vec3>) {
-    let at = |x: usize, y: usize| y * width + x;
-    let mut noise = Noise(1);
+/// Edges of a triangulated grid; the last column joins the first if it is `closed`.
+fn grid_edges(width: usize, height: usize, closed: bool) -> Vec<(usize, usize)> {
     let mut edges = Vec::new();
-    let mut positions = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            positions.push(Vec3::new(x as f32, y as f32, 0.3 * noise.next() as f32));
-            if x + 1 < width {
-                edges.push((at(x, y), at(x + 1, y)));
+            let (right, here) = ((x + 1) % width, y * width + x);
+            if right > x || closed {
+                edges.push((here, y * width + right));
             }
             if y + 1 < height {
-                edges.push((at(x, y), at(x, y + 1)));
-            }
-            if x + 1 < width && y + 1 < height {
-                edges.push((at(x, y), at(x + 1, y + 1)));
+                edges.push((here, here + width));
+                if right > x || closed {
+                    edges.push((here, (y + 1) * width + right));
+                }
             }
         }
     }
-    (squared_laplacian(width * height, &edges, 3.0), positions)
+    edges
 }
 
-fn check(name: &str, matrix: &SymmetricMatrix, positions: &[Vec3]) {
-    let n = matrix.size();
-    let factor = Cholesky::factor(matrix, positions).unwrap_or_else(|error| panic!("{name}: {error:?}"));
-    for columns in [0, 1, 3] {
-        let mut noise = Noise(columns as u64);
-        let wanted: Vec<f64> = (0..n * columns).map(|_| noise.next()).collect();
-        let rhs = multiply(matrix, &wanted, columns);
-        let mut x = rhs.clone();
-        factor.solve_in_place(&mut x, columns);
-        let back = multiply(matrix, &x, columns);
-        let scale = rhs.iter().fold(1e-300f64, |m, v| m.max(v.abs()));
-        let residual = back.iter().zip(&rhs).fold(0.0f64, |m, (a, b)| m.max((a - b).abs())) / scale;
-        assert!(residual < 1e-10, "{name}, {columns} columns: residual {residual:e}");
+type Case = (&'static str, SymmetricMatrix, Vec<Vec3>);
+
+fn grid(name: &'static str, width: usize, height: usize) -> Case {
+    let mut noise = Noise(1);
+    let position = |i: usize| Vec3::new((i % width) as f32, (i / width) as f32, 0.3 * noise.next() as f32);
+    let positions = (0..width * height).map(position).collect();
+    (name, squared_laplacian(width * height, &grid_edges(width, height, false), 3.0), positions)
+}
+
+/// A closed tube with folds, much coupled.
+fn tube(name: &'static str, around: usize, along: usize) -> Case {
+    let position = |i: usize| {
+        let angle = (i % around) as f32 / around as f32 * std::f32::consts::TAU;
+        let radius = 1.0 + 0.2 * (9.0 * angle).sin();
+        Vec3::new(radius * angle.cos(), radius * angle.sin(), (i / around) as f32 * 0.02)
+    };
+    let positions = (0..around * along).map(position).collect();
+    (name, squared_laplacian(around * along, &grid_edges(around, along, true), 100.0), positions)
+}
+
+/// A graph that has nothing to do with the positions of its vertices.
+fn random_graph(name: &'static str, n: usize, edges: usize) -> Case {
+    let mut noise = Noise(7);
+    let mut index = || ((noise.next() + 1.0) / 2.0 * n as f64) as usize;
+    let edges: Vec<_> = (0..edges).map(|_| (index(), index())).filter(|(i, j)| i != j).collect();
+    let positions = (0..n).map(|_| Vec3::new(noise.next() as f32, noise.next() as f32, noise.next() as f32)).collect();
+    (name, squared_laplacian(n, &edges, 0.7), positions)
+}
+
+/// Several cases as one matrix.
+fn side_by_side(name: &'static str, cases: &[Case]) -> Case {
+    let (mut matrix, mut positions) = (SymmetricMatrix { column_starts: vec![0], ..Default::default() }, Vec::new());
+    for (_, part, places) in cases {
+        let (first, entries) = (positions.len() as u32, matrix.rows.len());
+        matrix.rows.extend(part.rows.iter().map(|row| row + first));
+        matrix.values.extend(&part.values);
+        matrix.column_starts.extend(part.column_starts[1..].iter().map(|start| start + entries));
+        positions.extend(places.iter().map(|&place| place + Vec3::X * first as f32));
+    }
+    (name, matrix, positions)
+}
+
+fn arrow(n: usize) -> Case {
+    let entries: Vec<_> =
+        (0..n).flat_map(|i| [(i, i, 2.0), (i, n / 2, if i == n / 2 { n as f64 } else { 1.0 })]).collect();
+    ("arrow", assemble(n, &entries), (0..n).map(|i| Vec3::splat(i as f32)).collect())
+}
+
+fn with_positions(name: &'static str, (_, matrix, positions): Case, place: impl Fn(usize, Vec3) -> Vec3) -> Case {
+    (name, matrix, positions.into_iter().enumerate().map(|(i, position)| place(i, position)).collect())
+}
+
+/// Matrices that the solver may meet, from the plain to the degenerate.
+fn cases() -> Vec<Case> {
+    let diagonal: Vec<_> = (0..40).map(|i| (i, i, 1.0 + i as f64)).collect();
+    let mut tiny = grid("tiny numbers", 25, 20);
+    tiny.1.values.iter_mut().for_each(|value| *value *= 1e-200);
+    vec![
+        ("empty", SymmetricMatrix { column_starts: vec![0], ..Default::default() }, vec![]),
+        ("no starts at all", SymmetricMatrix::default(), vec![]),
+        ("one", assemble(1, &[(0, 0, 4.0)]), vec![Vec3::ZERO]),
+        ("diagonal", assemble(40, &diagonal), (0..40).map(|i| Vec3::Y * i as f32).collect()),
+        grid("seven", 7, 1),
+        grid("two blocks", 4, 4),
+        grid("thirty-three", 3, 11),
+        grid("small grid", 23, 19),
+        grid("grid", 70, 60),
+        grid("large grid", 130, 110),
+        grid("strip", 2000, 3),
+        tube("tube", 180, 50),
+        side_by_side("islands", &[grid("", 30, 20), grid("", 1, 1), grid("", 9, 9), tube("", 50, 20), grid("", 2, 1)]),
+        side_by_side("large islands", &[grid("", 70, 70), tube("", 90, 60)]),
+        arrow(400),
+        random_graph("random graph", 600, 900),
+        random_graph("large random graph", 5000, 5500),
+        with_positions("pairs of coincident positions", grid("", 70, 70), |i, p| {
+            (p / 2.0).floor() + Vec3::Z * (i % 2) as f32 * 0.0
+        }),
+        with_positions("few distinct positions", grid("", 70, 70), |i, _| Vec3::X * (i % 3) as f32),
+        with_positions("equal positions", grid("", 60, 50), |_, _| Vec3::ONE),
+        with_positions("many equal positions", grid("", 80, 80), |_, _| Vec3::ONE),
+        with_positions("collinear", grid("", 60, 50), |_, p| Vec3::ONE * p.x),
+        with_positions("huge coordinates", grid("", 60, 50), |_, p| p * 1e30),
+        with_positions("not finite", grid("", 40, 50), |i, p| if i % 7 == 0 { Vec3::NAN } else { p }),
+        tiny,
+    ]
+}
+
+fn noise(n: usize, seed: usize) -> Vec<f64> {
+    let mut noise = Noise(seed as u64);
+    (0..n).map(|_| noise.next()).collect()
+}
+
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |largest, value| if value.abs() <= largest { largest } else { value.abs() })
+}
+
+fn differences(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    largest(a.iter().zip(b).map(|(a, b)| a - b))
+}
+
+#[test]
+fn leaves_no_residual() {
+    for method in Method::ALL {
+        for (name, matrix, positions) in cases() {
+            let factor = Cholesky::factor_with(method, &matrix, &positions);
+            let factor = factor.unwrap_or_else(|error| panic!("{method:?}, {name}: {error:?}"));
+            for columns in [0, 1, 3, 60, 70] {
+                let rhs = multiply(&matrix, &noise(matrix.size() * columns, columns), columns);
+                let mut x = rhs.clone();
+                factor.solve_in_place(&mut x, columns);
+                let scale = largest(rhs.iter().copied());
+                let residual = differences(&multiply(&matrix, &x, columns), &rhs);
+                assert!(residual <= 1e-10 * scale, "{method:?}, {name}, {columns} columns: {residual:e} of {scale:e}");
+            }
+        }
     }
 }
 
 #[test]
-fn solves_what_it_is_given() {
-    check("empty", &SymmetricMatrix { column_starts: vec![0], ..Default::default() }, &[]);
-    check("one", &assemble(1, &[(0, 0, 4.0)]), &[Vec3::ZERO]);
-    let (matrix, positions) = grid(40, 30);
-    check("grid", &matrix, &positions);
+fn agrees_with_the_oracle() {
+    for method in Method::ALL {
+        for (name, matrix, positions) in cases().into_iter().filter(|case| case.1.size() > 0) {
+            let n = matrix.size();
+            let rhs = noise(n * 2, 5);
+            let right = Mat::from_fn(n, 2, |i, c| rhs[i * 2 + c]);
+            let wanted = if n <= 600 { dense_solve(&matrix, &right) } else { sparse_solve(&matrix, &right) };
+            let mut x = rhs.clone();
+            Cholesky::factor_with(method, &matrix, &positions).unwrap().solve_in_place(&mut x, 2);
+            let wanted: Vec<f64> = (0..n * 2).map(|i| wanted[(i / 2, i % 2)]).collect();
+            let error = differences(&x, &wanted) / largest(wanted);
+            assert!(error < 1e-9, "{method:?}, {name}: {error:e}");
+        }
+    }
 }
 
-#[test]
-fn agrees_with_a_dense_factorisation() {
-    let (matrix, positions) = grid(12, 9);
-    let n = matrix.size();
-    let mut dense = Mat::zeros(n, n);
-    for j in 0..n {
+fn dense_solve(matrix: &SymmetricMatrix, rhs: &Mat<f64>) -> Mat<f64> {
+    let mut dense = Mat::zeros(matrix.size(), matrix.size());
+    for j in 0..matrix.size() {
         for entry in matrix.column_starts[j]..matrix.column_starts[j + 1] {
             dense[(matrix.rows[entry] as usize, j)] = matrix.values[entry];
             dense[(j, matrix.rows[entry] as usize)] = matrix.values[entry];
         }
     }
-    let mut noise = Noise(5);
-    let rhs: Vec<f64> = (0..n * 2).map(|_| noise.next()).collect();
-    let oracle = dense.llt(Side::Lower).unwrap().solve(Mat::from_fn(n, 2, |i, c| rhs[i * 2 + c]));
-    let mut x = rhs.clone();
-    Cholesky::factor(&matrix, &positions).unwrap().solve_in_place(&mut x, 2);
-    for i in 0..n {
-        for c in 0..2 {
-            assert!((x[i * 2 + c] - oracle[(i, c)]).abs() < 1e-12);
+    dense.llt(Side::Lower).unwrap().solve(rhs)
+}
+
+fn sparse_solve(matrix: &SymmetricMatrix, rhs: &Mat<f64>) -> Mat<f64> {
+    let column = |entry: usize| matrix.column_starts.partition_point(|&start| start <= entry) - 1;
+    let entries: Vec<_> = (0..matrix.values.len())
+        .map(|entry| Triplet::new(matrix.rows[entry] as usize, column(entry), matrix.values[entry]))
+        .collect();
+    let sparse = SparseColMat::<usize, f64>::try_new_from_triplets(matrix.size(), matrix.size(), &entries).unwrap();
+    sparse.sp_cholesky(Side::Lower).unwrap().solve(rhs)
+}
+
+#[test]
+fn names_the_unknown_whose_pivot_fails() {
+    for method in Method::ALL {
+        for (_, mut matrix, positions) in [grid("", 3, 3), grid("", 40, 30), tube("", 120, 50)] {
+            for unknown in [0, matrix.size() / 3, matrix.size() - 1] {
+                let entry = matrix.column_starts[unknown];
+                for bad in [-1e3, f64::NAN] {
+                    let good = std::mem::replace(&mut matrix.values[entry], bad);
+                    let error = Cholesky::factor_with(method, &matrix, &positions).unwrap_err();
+                    assert_eq!(error, NotPositive { unknown }, "{method:?}, {bad}");
+                    matrix.values[entry] = good;
+                }
+            }
         }
     }
 }
 
 #[test]
-fn names_the_unknown_whose_pivot_fails() {
-    let mut matrix = assemble(5, &[(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (3, 3, -1.0), (4, 4, 1.0), (0, 4, 0.1)]);
-    let positions = vec![Vec3::ZERO; 5];
-    assert_eq!(Cholesky::factor(&matrix, &positions).unwrap_err(), NotPositive { unknown: 3 });
-    matrix.values[matrix.column_starts[3]] = 0.0;
-    assert_eq!(Cholesky::factor(&matrix, &positions).unwrap_err(), NotPositive { unknown: 3 });
+fn refuses_a_laplacian_that_nothing_holds() {
+    for method in Method::ALL {
+        for (width, height) in [(3, 3), (20, 17), (50, 90)] {
+            let weighted = |(k, (i, j)): (usize, (usize, usize))| {
+                let weight = 0.1 + (k % 7) as f64;
+                [(i, i, weight), (j, j, weight), (i, j, -weight)]
+            };
+            let entries: Vec<_> = grid_edges(width, height, false).into_iter().enumerate().flat_map(weighted).collect();
+            let matrix = assemble(width * height, &entries);
+            let (_, _, positions) = grid("", width, height);
+            assert!(Cholesky::factor_with(method, &matrix, &positions).is_err(), "{method:?}, {width} x {height}");
+        }
+    }
 }
 
 #[test]
-fn refuses_a_laplacian_that_nothing_holds() {
-    let edges = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)];
-    let entries: Vec<_> = edges.iter().flat_map(|&(i, j)| [(i, i, 0.3), (j, j, 0.3), (i, j, -0.3)]).collect();
-    assert!(Cholesky::factor(&assemble(4, &entries), &[Vec3::ZERO; 4]).is_err());
+fn gives_the_same_bits_on_any_number_of_threads() {
+    for (name, matrix, positions) in [grid("grid", 150, 130), tube("tube", 300, 60)] {
+        let solve = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut x = noise(matrix.size() * 21, 3);
+            pool.install(|| Cholesky::factor(&matrix, &positions).unwrap().solve_in_place(&mut x, 21));
+            x.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        let one = solve(1);
+        assert!(one == solve(2) && one == solve(3), "{name}");
+    }
+}
+
+#[test]
+fn leaves_zero_columns_exactly_zero() {
+    for method in Method::ALL {
+        let (_, matrix, positions) = tube("", 150, 60);
+        let factor = Cholesky::factor_with(method, &matrix, &positions).unwrap();
+        for columns in [12, 100] {
+            let is_zero = |column: usize| column % 3 == 1;
+            let mut x = noise(matrix.size() * columns, 9);
+            x.iter_mut().enumerate().filter(|(i, _)| is_zero(i % columns)).for_each(|(_, value)| *value = 0.0);
+            factor.solve_in_place(&mut x, columns);
+            assert!(x.iter().enumerate().all(|(i, &value)| (value == 0.0) == is_zero(i % columns)));
+        }
+    }
+}
+
+/// Right-hand sides that live on few unknowns each take the short way through the tree.
+#[test]
+fn solves_sparse_right_hand_sides_as_it_does_full_ones() {
+    let (_, matrix, positions) = grid("", 90, 80);
+    let factor = Cholesky::factor(&matrix, &positions).unwrap();
+    let (n, columns) = (matrix.size(), 29);
+    let mut x = vec![0.0; n * columns];
+    let mut full = noise(n * (columns + 1), 2);
+    for i in 0..n {
+        for column in 0..columns {
+            let value = if i * 13 % 977 == column { 1.0 + i as f64 } else { 0.0 };
+            x[i * columns + column] = value;
+            full[i * (columns + 1) + column] = value;
+        }
+    }
+    factor.solve_in_place(&mut x, columns);
+    factor.solve_in_place(&mut full, columns + 1);
+    let full: Vec<f64> = full.chunks_exact(columns + 1).flat_map(|row| &row[..columns]).copied().collect();
+    assert!(differences(&x, &full) <= 1e-12 * largest(full));
 }

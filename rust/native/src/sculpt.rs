@@ -225,13 +225,11 @@ pub fn simplex_qp<'py>(
             "shapes must be (P, N, N), (P, N), (P, N), N to 12, not {shapes}"
         )));
     }
-    let (h, g, w): (Vec<f64>, Vec<f64>, Vec<f64>) = (
-        h.as_array().iter().copied().collect(),
-        g.as_array().iter().copied().collect(),
-        start.as_array().iter().copied().collect(),
-    );
-    let solved =
-        enter(py, threads, move || Ok(if n <= 4 { solve::<4>(n, &h, &g, w) } else { solve::<12>(n, &h, &g, w) }))?;
+    let (h, g) = (h.as_array(), g.as_array());
+    let (h, g) = (h.as_standard_layout(), g.as_standard_layout());
+    let (h, g) = (h.as_slice().expect("standard layout"), g.as_slice().expect("standard layout"));
+    let w = start.as_array().iter().copied().collect();
+    let solved = enter(py, threads, move || Ok(if n <= 4 { solve::<4>(n, h, g, w) } else { solve::<12>(n, h, g, w) }))?;
     PyArray1::from_vec(py, solved).reshape([count, n])
 }
 

@@ -65,7 +65,7 @@ def body(armature: bpy.types.Object, bones: int) -> bpy.types.Object:
 
 def dress(vertices: int) -> bpy.types.Object:
     """About so many vertices, a third of them too far from the body; the last four are the buckle."""
-    rings = around = int(round(vertices**0.5))
+    rings = around = round(vertices**0.5)
     t = np.linspace(0, 1, rings)
     flare = np.clip(0.45 - t, 0, None) * 0.9
     obj = tube("Dress", 0.32 + flare, 0.25, 1.8, around)

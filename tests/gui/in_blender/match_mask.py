@@ -31,7 +31,7 @@ def near(a: list[dict[str, float]], b: list[dict[str, float]]) -> bool:
 def steps(window: Window) -> Steps:
     yield 0.5
     enable()
-    armature, figure, garment = dress.build()
+    _, figure, garment = dress.build()
     bpy.context.scene.skinwright.transfer.source = figure
     with window.context():
         bpy.ops.ed.undo_push(message="Scene")

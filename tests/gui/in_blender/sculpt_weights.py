@@ -12,8 +12,8 @@ from driver import Steps, Window, enable, record, start, until
 from sculpting import begin, character, positions, session
 
 # Grabs at the outer side of the bend, then at the inner side.
-STROKE = [(40 + 5 * i, 12 - 4 * i) for i in range(9)]
-LATER = [(-30 - 4 * i, 10 + 3 * i) for i in range(9)]
+STROKE = [(95 + 3 * i, 12 + 2 * i) for i in range(9)]
+LATER = [(20 - 4 * i, -2 - 3 * i) for i in range(9)]
 
 
 def state() -> tuple:

@@ -45,7 +45,7 @@ def positions() -> np.ndarray:
     return np.array([vertex.co for vertex in bpy.data.objects["Body"].data.vertices], np.float32)
 
 
-def brush(window: Window) -> None:
+def brush(window: Window, size: int) -> None:
     """A brush that grabs; made here, as Debian's 4.3 comes without brushes."""
     with window.context():
         settings = bpy.context.tool_settings
@@ -56,14 +56,14 @@ def brush(window: Window) -> None:
         bpy.ops.brush.asset_activate(asset_library_type="LOCAL", relative_asset_identifier="Brush/Test Grab")
         unified = getattr(settings.sculpt, "unified_paint_settings", None) or settings.unified_paint_settings
         unified.use_unified_size = True
-        unified.size = 70
+        unified.size = size
 
 
-def begin(window: Window, desparsify: bool = True) -> Steps:
+def begin(window: Window, desparsify: bool = True, size: int = 70) -> Steps:
     """Start the operator; returns once it runs and a brush is in hand."""
     bpy.context.scene.skinwright.sculpt.add_candidates = desparsify
     with window.context():
         bpy.ops.skinwright.sculpt_weights("INVOKE_DEFAULT")
     yield from until(lambda: session() is not None)
-    brush(window)
+    brush(window, size)
     yield 0.8

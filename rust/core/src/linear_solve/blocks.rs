@@ -39,8 +39,3 @@ pub(super) fn panel_index(columns: usize, row: usize, column: usize) -> usize {
         diagonal_len(columns) + below / BLOCK * BLOCK * columns + BLOCK * column + below % BLOCK
     }
 }
-
-/// Where element (row, column) of an update lies, `row >= column`.
-pub(super) fn update_index(row: usize, column: usize) -> usize {
-    triangle_len(row / BLOCK) + BLOCK * column + row % BLOCK
-}

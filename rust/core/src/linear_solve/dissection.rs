@@ -2,17 +2,17 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::Vec3;
 
+use super::bisection::{Plane, Point, halve, principal_axes};
 use super::graph::Graph;
+use super::patch::{self, Patch, first_where};
 use super::vertex_cover::minimum_vertex_cover;
 
-/// Sets up to this size are factored densely: their couplings fill nearly all of their block.
-const LEAF: usize = 32;
 /// Sets above this size are cut on two threads.
 const FORK: usize = 4096;
 /// Sets above this size try every axis; below, the longest one is good enough.
-const TRY_AXES: usize = 1024;
+const TRY_AXES: usize = 8192;
 /// A separator that takes more than this share of a set larger than [`FORK`] tells that positions do not follow the graph.
 const POOR: f64 = 0.3;
 
@@ -51,38 +51,12 @@ pub(super) fn dissect(graph: &Graph, positions: &[Vec3]) -> Option<Dissection> {
     })
 }
 
-#[derive(Clone, Copy)]
-struct Point {
-    position: Vec3,
-    /// Distance to the farthest neighbour.
-    reach: f32,
-    unknown: u32,
-    /// Place along the axis of the cut at hand.
-    key: f32,
-}
-
 fn points(graph: &Graph, positions: &[Vec3]) -> Vec<Point> {
     let point = |(i, &position): (usize, &Vec3)| {
         let reach = graph.neighbours(i).map(|j| position.distance_squared(positions[j])).fold(0.0, f32::max).sqrt();
         Point { position, reach, unknown: i as u32, key: 0.0 }
     };
     positions.iter().enumerate().map(point).collect()
-}
-
-/// A plane through the point cloud; points on it are told apart by their index.
-#[derive(Clone, Copy)]
-struct Plane {
-    axis: Vec3,
-    origin: Vec3,
-    key: f32,
-    unknown: u32,
-}
-
-impl Plane {
-    fn is_below(&self, position: Vec3, unknown: u32) -> bool {
-        let key = self.axis.dot(position - self.origin);
-        key.total_cmp(&self.key).then(unknown.cmp(&self.unknown)).is_lt()
-    }
 }
 
 struct Cutter<'a> {
@@ -97,9 +71,10 @@ impl Cutter<'_> {
     /// Orders `points` in place, the first of which takes place `first`, and returns the nodes.
     fn dissect(&self, points: &mut [Point], first: usize) -> Option<Vec<Node>> {
         let n = points.len();
-        if n <= LEAF {
+        if n <= patch::MOST {
+            let nodes = self.patch(points);
             self.number(points, first);
-            return Some(vec![Node { columns: n, descendants: 0 }]);
+            return Some(nodes);
         }
         let (below, above) = self.cut(points);
         if n > FORK && (n - below - above) as f64 > POOR * n as f64 {
@@ -118,6 +93,16 @@ impl Cutter<'_> {
         self.number(separator, first + below + above);
         nodes.push(Node { columns: separator.len(), descendants: nodes.len() });
         Some(nodes)
+    }
+
+    /// Orders a small set and returns its nodes.
+    fn patch(&self, points: &mut [Point]) -> Vec<Node> {
+        self.number(points, 0);
+        let local = |j: usize| self.place[j].load(Ordering::Relaxed) as usize;
+        let neighbours = |i: u32| self.graph.neighbours(i as usize).filter(|&j| !self.is_removed(j)).map(local);
+        let mut nodes = Vec::new();
+        Patch::new(points, neighbours).dissect(points, &mut nodes);
+        nodes
     }
 
     fn number(&self, points: &[Point], first: usize) {
@@ -158,26 +143,15 @@ impl Cutter<'_> {
             self.removed[unknown as usize].store(true, Ordering::Relaxed);
         }
         let middle = points.len() / 2;
-        let below = self.kept_first(&mut points[..middle]);
-        let above = self.kept_first(&mut points[middle..]);
+        let kept = |point: &Point| !self.is_removed(point.unknown as usize);
+        let below = first_where(&mut points[..middle], kept);
+        let above = first_where(&mut points[middle..], kept);
         points[below..].rotate_left(middle - below);
         (below, above)
     }
 
     fn is_removed(&self, unknown: usize) -> bool {
         self.removed[unknown].load(Ordering::Relaxed)
-    }
-
-    /// Moves points that are in no separator to the front and returns their number.
-    fn kept_first(&self, points: &mut [Point]) -> usize {
-        let mut kept = 0;
-        for i in 0..points.len() {
-            if !self.is_removed(points[i].unknown as usize) {
-                points.swap(i, kept);
-                kept += 1;
-            }
-        }
-        kept
     }
 
     /// Unknowns without which no two of `points` on different sides of `plane` are coupled; as few as there can be.
@@ -209,49 +183,4 @@ impl Cutter<'_> {
         let (left, right) = minimum_vertex_cover(&starts, &edges, upper.len());
         left.iter().map(|&i| lower[i as usize]).chain(right.iter().map(|&i| upper[i as usize])).collect()
     }
-}
-
-/// Puts the lower half of `points` along `axis` first.
-fn halve(points: &mut [Point], axis: Vec3) -> Plane {
-    let origin = points[0].position;
-    for point in points.iter_mut() {
-        point.key = axis.dot(point.position - origin);
-    }
-    let middle = points.len() / 2;
-    let order = |a: &Point, b: &Point| a.key.total_cmp(&b.key).then(a.unknown.cmp(&b.unknown));
-    let (_, median, _) = points.select_nth_unstable_by(middle, order);
-    Plane { axis, origin, key: median.key, unknown: median.unknown }
-}
-
-/// Directions of greatest, second and least extent.
-fn principal_axes(points: &[Point]) -> [Vec3; 3] {
-    let origin = points[0].position;
-    let (mut sum, mut squares) = (DVec3::ZERO, DMat3::ZERO);
-    for point in points {
-        let p = (point.position - origin).as_dvec3();
-        sum += p;
-        squares += DMat3::from_cols(p * p.x, p * p.y, p * p.z);
-    }
-    let mean = sum / points.len() as f64;
-    let covariance =
-        squares * (1.0 / points.len() as f64) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z);
-    let first = dominant_axis(covariance);
-    let spread = first.dot(covariance * first);
-    let second =
-        dominant_axis(covariance - DMat3::from_cols(first * first.x, first * first.y, first * first.z) * spread);
-    let second = (second - first * first.dot(second)).try_normalize().unwrap_or(first.any_orthonormal_vector());
-    [first.as_vec3(), second.as_vec3(), first.cross(second).as_vec3()]
-}
-
-/// Unit eigenvector of the largest eigenvalue, near enough, by repeated squaring.
-fn dominant_axis(covariance: DMat3) -> DVec3 {
-    let mut power = covariance;
-    for _ in 0..8 {
-        let scale = power.x_axis.x + power.y_axis.y + power.z_axis.z;
-        power = power * (1.0 / scale.max(f64::MIN_POSITIVE));
-        power = power * power;
-    }
-    let columns = [power.x_axis, power.y_axis, power.z_axis];
-    let longest = columns.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-    longest.and_then(DVec3::try_normalize).unwrap_or(DVec3::X)
 }

@@ -1,18 +1,20 @@
 //! The multifrontal factorisation: each front gathers matrix entries and its children's updates, eliminates its columns
 //! and passes on what is left (Duff and Reid 1983; Liu 1992).
 
+use std::ops::Range;
+
 use pulp::Arch;
 
 use super::blocks::{BLOCK, panel_index, triangle_len};
 use super::buffer::Buffer;
 use super::graph::Graph;
-use super::kernels::{Eliminate, Pivot, Schur};
+use super::kernels::{Eliminate, Pivot, Product};
 use super::tree::{Front, Tree};
 use super::walk::{Plan, Received, Visit, walk};
 use super::{NotPositive, pivot_floor};
 
 /// Work of a front (multiplications) worth a second thread.
-const FORK: usize = 1 << 20;
+const FORK: usize = 1 << 21;
 /// Block columns that are eliminated on one thread before all threads use them on the rows below.
 const PIVOT_BLOCKS: usize = 16;
 
@@ -66,8 +68,10 @@ impl Visit for Factor<'_> {
         }
         let mut rows = row_blocks(panel, front.columns);
         self.eliminate_columns(front, &mut rows)?;
-        let lower = &rows[front.columns.div_ceil(BLOCK)..];
-        schur(self.arch, lower, &mut update_blocks(update), 0, front.columns, &children);
+        let lower: Vec<&[f64]> = rows[front.columns.div_ceil(BLOCK)..].iter().map(|row| &**row).collect();
+        let mut update = update_blocks(update);
+        product(self.arch, &lower, &lower, &mut update, 0, true);
+        add_children(&mut update, 0, &children);
         Ok(())
     }
 }
@@ -107,37 +111,67 @@ impl Factor<'_> {
     /// Left-looking elimination, [`PIVOT_BLOCKS`] block columns at a time.
     fn eliminate_columns(&self, front: &Front, rows: &mut [&mut [f64]]) -> Result<(), NotPositive> {
         let k = front.columns;
-        let unknowns = &self.tree.order[front.start..front.start + k];
-        let floors: Vec<f64> = unknowns.iter().map(|&i| pivot_floor(self.graph.diagonal(i as usize))).collect();
         let blocks = k.div_ceil(BLOCK);
         for first in (0..blocks).step_by(PIVOT_BLOCKS) {
             let last = blocks.min(first + PIVOT_BLOCKS);
+            subtract_earlier(self.arch, &mut rows[first..], first, last - first);
             for block in first..last {
                 let (pivots, rest) = rows.split_at_mut(block);
                 eliminate(self.arch, pivots, &mut rest[..1], first..block, k);
-                let columns = BLOCK * block..k.min(BLOCK * block + BLOCK);
-                let pivot = Pivot { row: rest[0], floors: &floors[columns.clone()] };
-                let failed = |column| NotPositive { unknown: unknowns[columns.start + column] as usize };
-                self.arch.dispatch(pivot).map_err(failed)?;
+                self.pivot(front, block, &mut rest[0][BLOCK * BLOCK * first..])?;
             }
             let (pivots, rest) = rows.split_at_mut(last);
             eliminate(self.arch, pivots, rest, first..last, k);
         }
         Ok(())
     }
+
+    /// Factors block `block` of the front's diagonal, the last one of `row`.
+    fn pivot(&self, front: &Front, block: usize, row: &mut [f64]) -> Result<(), NotPositive> {
+        let columns = front.start + BLOCK * block..front.start + front.columns.min(BLOCK * block + BLOCK);
+        let unknowns = &self.tree.order[columns];
+        let floors: Vec<f64> = unknowns.iter().map(|&i| pivot_floor(self.graph.diagonal(i as usize))).collect();
+        let failed = |column: usize| NotPositive { unknown: unknowns[column] as usize };
+        self.arch.dispatch(Pivot { row, floors: &floors }).map_err(failed)
+    }
+}
+
+/// Subtracts what the block columns before `first` contribute to the next `count` ones of `rows`, the first of which is
+/// row block `first`.
+fn subtract_earlier(arch: Arch, rows: &mut [&mut [f64]], first: usize, count: usize) {
+    if first == 0 {
+        return;
+    }
+    let (earlier, mut now): (Vec<&[f64]>, Vec<&mut [f64]>) = rows
+        .iter_mut()
+        .map(|row| {
+            let (earlier, now) = row.split_at_mut(BLOCK * BLOCK * first);
+            (&*earlier, now)
+        })
+        .unzip();
+    product(arch, &earlier, &earlier[..count], &mut now, 0, false);
+}
+
+/// [`Product`] on several threads where that pays.
+fn product(arch: Arch, a: &[&[f64]], b: &[&[f64]], target: &mut [&mut [f64]], first: usize, overwrite: bool) {
+    let depth = b.first().map_or(0, |b| b.len());
+    if target.len() > 3 && BLOCK * depth * target.len() * b.len().min(first + target.len()) > FORK {
+        let middle = middle_row(first, target.len(), b.len());
+        let (above, below) = a.split_at(middle);
+        let (left, right) = target.split_at_mut(middle);
+        rayon::join(
+            || product(arch, above, b, left, first, overwrite),
+            || product(arch, below, b, right, first + middle, overwrite),
+        );
+    } else {
+        arch.dispatch(Product { a, b, target, first, overwrite });
+    }
 }
 
 /// Eliminates the block columns `blocks` in `rows`, on several threads where that pays.
-fn eliminate(
-    arch: Arch,
-    pivots: &[&mut [f64]],
-    rows: &mut [&mut [f64]],
-    blocks: std::ops::Range<usize>,
-    columns: usize,
-) {
-    let work = BLOCK * rows.len() * BLOCK * blocks.len() * BLOCK * blocks.end;
-    if work > FORK && rows.len() > 3 {
-        let (left, right) = rows.split_at_mut((rows.len() / 2).next_multiple_of(3));
+fn eliminate(arch: Arch, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks: Range<usize>, columns: usize) {
+    if rows.len() > 3 && BLOCK * rows.len() * (BLOCK * blocks.len()).pow(2) > FORK {
+        let (left, right) = rows.split_at_mut((rows.len() / 6 * 3).max(3));
         rayon::join(
             || eliminate(arch, pivots, left, blocks.clone(), columns),
             || eliminate(arch, pivots, right, blocks.clone(), columns),
@@ -147,30 +181,28 @@ fn eliminate(
     }
 }
 
-/// Computes the row blocks of the update from `first` on: minus the panel's product, plus what the children passed on.
-fn schur(
-    arch: Arch,
-    lower: &[&mut [f64]],
-    update: &mut [&mut [f64]],
-    first: usize,
-    columns: usize,
-    children: &[Child],
-) {
-    let work = BLOCK * BLOCK * update.len() * (first + update.len() / 2) * columns;
-    if work > FORK && update.len() > 3 {
-        // Rows grow longer: about as much work is in the first six tenths as in the rest.
-        let middle = if first == 0 { update.len() * 7 / 10 } else { update.len() * 6 / 10 }.next_multiple_of(3);
-        let (left, right) = update.split_at_mut(middle.min(update.len()));
-        rayon::join(
-            || schur(arch, lower, left, first, columns, children),
-            || schur(arch, lower, right, first + middle, columns, children),
-        );
+/// Adds the children's updates to the row blocks of the parent's update from `first` on.
+fn add_children(update: &mut [&mut [f64]], first: usize, children: &[Child]) {
+    if update.len() > 3 && BLOCK * BLOCK * update.len() * (first + update.len()) > FORK / 4 {
+        let middle = middle_row(first, update.len(), usize::MAX);
+        let (left, right) = update.split_at_mut(middle);
+        rayon::join(|| add_children(left, first, children), || add_children(right, first + middle, children));
     } else {
-        arch.dispatch(Schur { lower, update, first, columns });
-        for child in children {
-            child.add_to_update(update, first);
-        }
+        children.iter().for_each(|child| child.add_to_update(update, first));
     }
+}
+
+/// Splits `count` row blocks from `first` on, each as long as its number but no longer than `most`, into halves of about
+/// the same work; whole groups of three.
+fn middle_row(first: usize, count: usize, most: usize) -> usize {
+    let tenths = if first >= most {
+        5
+    } else if first == 0 {
+        7
+    } else {
+        6
+    };
+    (count * tenths / 10 / 3 * 3).max(3)
 }
 
 /// An update on its way into the parent's front.
@@ -191,7 +223,8 @@ impl Child<'_> {
 
     /// Adds the columns that the parent eliminates.
     fn add_to_panel(&self, columns: usize, panel: &mut [f64]) {
-        for (i, &place) in self.in_parent.iter().enumerate() {
+        let rows = if self.inside == 0 { &[] } else { self.in_parent };
+        for (i, &place) in rows.iter().enumerate() {
             let start = panel_index(columns, place as usize, 0);
             let row = &mut panel[start..];
             for (&column, values) in self.in_parent[..self.inside.min(i + 1)].iter().zip(self.row(i)) {

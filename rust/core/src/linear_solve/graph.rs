@@ -36,10 +36,6 @@ impl<'m> Graph<'m> {
         Self { matrix, row_starts, columns, values }
     }
 
-    pub(super) fn size(&self) -> usize {
-        self.matrix.size()
-    }
-
     /// Unknowns coupled to unknown `i`, without itself.
     pub(super) fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> {
         let before = &self.columns[self.row_starts[i]..self.row_starts[i + 1]];

@@ -3,12 +3,15 @@
 //! Everything is a sum of products of eight-wide streams held in registers: with 32 registers 24 vectors at a time, else 8.
 //! Each sum runs in one fixed order, so how rows are shared out among threads never shows in the bits.
 
+use std::ops::Range;
+
 use pulp::{Simd, WithSimd};
 
 use super::blocks::BLOCK;
 
-/// Columns of a product that are accumulated before they are stored, so that the streams stay in the cache.
+/// Columns that a product sums up before it stores, and row blocks it keeps at hand meanwhile: half a megabyte.
 const DEPTH: usize = 256;
+const BREADTH: usize = 32;
 
 /// Sums over p of `a[v][p * stride] * b[p][first + c]`.
 #[inline(always)]
@@ -57,8 +60,8 @@ fn divide<S: Simd, const V: usize>(simd: S, x: &mut [[S::f64s; BLOCK]; V], pivot
     }
 }
 
-/// Factors the block columns `first..last` of the row blocks `rows` of a panel. `pivots` are the panel's row blocks before
-/// them, complete up to `last`.
+/// Factors the block columns `first..last` of the row blocks `rows` of a panel, earlier ones being subtracted already.
+/// `pivots` are the panel's row blocks before them, complete up to `last`.
 pub(super) struct Eliminate<'a, 'p, 'r> {
     pub(super) pivots: &'a [&'p mut [f64]],
     pub(super) rows: &'a mut [&'r mut [f64]],
@@ -73,20 +76,21 @@ impl WithSimd for Eliminate<'_, '_, '_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { pivots, rows, first, last, columns } = self;
+        let skip = BLOCK * BLOCK * first;
         let tile = |rows: &mut [&mut [f64]]| {
             for (block, pivot_row) in pivots.iter().enumerate().take(last).skip(first) {
                 let start = BLOCK * BLOCK * block;
                 let width = BLOCK.min(columns - BLOCK * block);
                 let pivot = pivot_block(&pivot_row[start..start + BLOCK * width]);
-                let before = pivot_row[..start].as_chunks().0;
+                let before = pivot_row[BLOCK * BLOCK * first..start].as_chunks().0;
                 match rows {
                     [r0, r1, r2] if S::F64_LANES == BLOCK => {
-                        eliminate_tile::<S, 3>(simd, [r0, r1, r2], 0, before, &pivot, width);
+                        eliminate_tile::<S, 3>(simd, [r0, r1, r2].map(|row| &mut row[skip..]), 0, before, &pivot, width);
                     }
                     _ => {
                         for row in rows.iter_mut() {
                             for part in 0..(BLOCK / S::F64_LANES) {
-                                eliminate_tile::<S, 1>(simd, [row], part, before, &pivot, width);
+                                eliminate_tile::<S, 1>(simd, [&mut row[skip..]], part, before, &pivot, width);
                             }
                         }
                     }
@@ -118,22 +122,22 @@ fn eliminate_tile<S: Simd, const V: usize>(
     let sum = product::<S, V, BLOCK>(simd, done, stride, before, 0);
     let mut x = [[simd.splat_f64s(0.0); BLOCK]; V];
     for v in 0..V {
-        for c in 0..width {
-            x[v][c] = now[v][c * stride];
-        }
         for c in 0..BLOCK {
-            x[v][c] = simd.sub_f64s(x[v][c], sum[v][c]);
+            let old = if c < width { now[v][c * stride] } else { simd.splat_f64s(0.0) };
+            x[v][c] = simd.sub_f64s(old, sum[v][c]);
         }
     }
     divide(simd, &mut x, pivots);
     for v in 0..V {
-        for c in 0..width {
-            now[v][c * stride] = x[v][c];
+        for c in 0..BLOCK {
+            if c < width {
+                now[v][c * stride] = x[v][c];
+            }
         }
     }
 }
 
-/// Factors the block of `row` on the diagonal, the columns before it being complete. A pivot must exceed its floor.
+/// Factors the block on the diagonal at the end of `row`, its other columns being complete. A pivot must exceed its floor.
 pub(super) struct Pivot<'a> {
     pub(super) row: &'a mut [f64],
     pub(super) floors: &'a [f64],
@@ -176,40 +180,62 @@ impl WithSimd for Pivot<'_> {
     }
 }
 
-/// Sets row blocks `first..` of an update to minus the product of the panel's `lower` row blocks with themselves.
-pub(super) struct Schur<'a, 'l, 'u> {
-    pub(super) lower: &'a [&'l mut [f64]],
-    pub(super) update: &'a mut [&'u mut [f64]],
+/// Subtracts from (or overwrites with the negative of) a trapezoid of blocks the product of row blocks `a` with `b`,
+/// transposed: block column j of `target[i]` gets `a[i] * b[j]^T` for every j up to `first + i`.
+pub(super) struct Product<'a, 't> {
+    pub(super) a: RowBlocks<'a>,
+    pub(super) b: RowBlocks<'a>,
+    pub(super) target: &'a mut [&'t mut [f64]],
     pub(super) first: usize,
-    pub(super) columns: usize,
+    pub(super) overwrite: bool,
 }
 
-impl WithSimd for Schur<'_, '_, '_> {
+impl WithSimd for Product<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { lower, update, first, columns } = self;
-        for start in (0..columns.max(1)).step_by(DEPTH) {
-            let depth = BLOCK * start..BLOCK * columns.min(start + DEPTH);
-            for (group, update) in update.chunks_mut(3).enumerate() {
-                let row = first + 3 * group;
-                for (column, b) in lower.iter().enumerate().take(row + update.len()) {
-                    let b = b[depth.clone()].as_chunks().0;
-                    match update {
-                        [u0, u1, u2] if S::F64_LANES == BLOCK && column <= row => {
-                            let a = [0, 1, 2].map(|v| S::as_simd_f64s(&lower[row + v][depth.clone()]).0);
-                            let sum = product::<S, 3, BLOCK>(simd, a, 1, b, 0);
-                            for (u, sum) in [u0, u1, u2].into_iter().zip(sum) {
-                                subtract(simd, block_mut(u, column), 0, 0, sum, start == 0);
-                            }
-                        }
-                        _ => {
-                            for (v, u) in update.iter_mut().enumerate().filter(|&(v, _)| column <= row + v) {
-                                let a = &lower[row + v][depth.clone()];
-                                subtract_block(simd, block_mut(u, column), a, b, start == 0);
-                            }
-                        }
+        let Self { a, b, target, first, overwrite } = self;
+        let len = b.first().map_or(0, |b| b.len());
+        for start in (0..len).step_by(BLOCK * DEPTH) {
+            let depth = start..len.min(start + BLOCK * DEPTH);
+            let overwrite = overwrite && start == 0;
+            for (j, b) in b.chunks(BREADTH).enumerate() {
+                for (i, (a, target)) in a.chunks(3).zip(target.chunks_mut(3)).enumerate() {
+                    trapezoid(simd, a, b, target, first + 3 * i, BREADTH * j, depth.clone(), overwrite);
+                }
+            }
+        }
+    }
+}
+
+/// The part of a product in up to three row blocks from `row` on and in the block columns from `column` on.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn trapezoid<S: Simd>(
+    simd: S,
+    a: RowBlocks,
+    b: RowBlocks,
+    target: &mut [&mut [f64]],
+    row: usize,
+    column: usize,
+    depth: Range<usize>,
+    overwrite: bool,
+) {
+    for (j, b) in b.iter().enumerate() {
+        let (b, column) = (b[depth.clone()].as_chunks().0, column + j);
+        match (a, &mut *target) {
+            ([a0, a1, a2], [t0, t1, t2]) if S::F64_LANES == BLOCK && column <= row => {
+                let a = [a0, a1, a2].map(|a| S::as_simd_f64s(&a[depth.clone()]).0);
+                let sum = product::<S, 3, BLOCK>(simd, a, 1, b, 0);
+                subtract(simd, block_mut(t0, column), 0, 0, &sum[0], overwrite);
+                subtract(simd, block_mut(t1, column), 0, 0, &sum[1], overwrite);
+                subtract(simd, block_mut(t2, column), 0, 0, &sum[2], overwrite);
+            }
+            (a, target) => {
+                for (i, (a, target)) in a.iter().zip(target).enumerate() {
+                    if column <= row + i {
+                        subtract_block(simd, block_mut(target, column), &a[depth.clone()], b, overwrite);
                     }
                 }
             }
@@ -217,8 +243,11 @@ impl WithSimd for Schur<'_, '_, '_> {
     }
 }
 
-fn block_mut(row: &mut [f64], column: usize) -> &mut [f64] {
-    &mut row[BLOCK * BLOCK * column..][..BLOCK * BLOCK]
+/// A block of a row block; the last one of a panel may be narrow.
+fn block_mut<'r>(row: &'r mut [f64], column: usize) -> &'r mut [f64] {
+    let row = &mut row[BLOCK * BLOCK * column..];
+    let len = row.len().min(BLOCK * BLOCK);
+    &mut row[..len]
 }
 
 #[inline(always)]
@@ -229,11 +258,11 @@ fn subtract_block<S: Simd>(simd: S, target: &mut [f64], a: &[f64], b: &[[f64; BL
         let a = &a[part.min(a.len())..];
         if S::F64_LANES == BLOCK {
             let [sum] = product::<S, 1, BLOCK>(simd, [a], stride, b, 0);
-            subtract(simd, target, part, 0, sum, overwrite);
+            subtract(simd, target, part, 0, &sum, overwrite);
         } else {
             for first in [0, 4] {
                 let [sum] = product::<S, 1, 4>(simd, [a], stride, b, first);
-                subtract(simd, target, part, first, sum, overwrite);
+                subtract(simd, target, part, first, &sum, overwrite);
             }
         }
     }
@@ -246,14 +275,15 @@ fn subtract<S: Simd, const C: usize>(
     block: &mut [f64],
     part: usize,
     first: usize,
-    sum: [S::f64s; C],
+    sum: &[S::f64s; C],
     overwrite: bool,
 ) {
     let stride = BLOCK / S::F64_LANES;
     let block = S::as_mut_simd_f64s(block).0;
-    for (c, sum) in sum.into_iter().enumerate() {
-        let target = &mut block[(first + c) * stride + part];
-        *target = simd.sub_f64s(if overwrite { simd.splat_f64s(0.0) } else { *target }, sum);
+    for c in 0..C {
+        if let Some(target) = block.get_mut((first + c) * stride + part) {
+            *target = simd.sub_f64s(if overwrite { simd.splat_f64s(0.0) } else { *target }, sum[c]);
+        }
     }
 }
 
@@ -305,19 +335,39 @@ fn forward_tile<S: Simd, const V: usize>(
 ) {
     let a: [&[S::f64s]; V] = std::array::from_fn(|v| &done[(at + v).min(done.len())..]);
     let sum = product::<S, V, BLOCK>(simd, a, stride, before, 0);
+    let mut x = subtract_from::<S, V>(simd, now, stride, at, &sum);
+    divide(simd, &mut x, pivots);
+    store::<S, V>(now, stride, at, &x);
+}
+
+/// Up to eight rows of `target` minus `sum`; rows that are not there count as zero. (Indices are constants everywhere, or
+/// the sums would live in memory instead of registers.)
+#[inline(always)]
+fn subtract_from<S: Simd, const V: usize>(
+    simd: S,
+    target: &[S::f64s],
+    stride: usize,
+    at: usize,
+    sum: &[[S::f64s; BLOCK]; V],
+) -> [[S::f64s; BLOCK]; V] {
     let mut x = [[simd.splat_f64s(0.0); BLOCK]; V];
-    for v in 0..V {
-        for (c, row) in now.chunks_exact(stride).enumerate() {
-            x[v][c] = row[at + v];
-        }
-        for c in 0..BLOCK {
-            x[v][c] = simd.sub_f64s(x[v][c], sum[v][c]);
+    for c in 0..BLOCK {
+        for v in 0..V {
+            let old = target.get(c * stride + at + v).copied().unwrap_or(simd.splat_f64s(0.0));
+            x[v][c] = simd.sub_f64s(old, sum[v][c]);
         }
     }
-    divide(simd, &mut x, pivots);
-    for v in 0..V {
-        for (c, row) in now.chunks_exact_mut(stride).enumerate() {
-            row[at + v] = x[v][c];
+    x
+}
+
+/// Puts `x` into the rows of `target` that are there.
+#[inline(always)]
+fn store<S: Simd, const V: usize>(target: &mut [S::f64s], stride: usize, at: usize, x: &[[S::f64s; BLOCK]; V]) {
+    for c in 0..BLOCK {
+        for v in 0..V {
+            if let Some(target) = target.get_mut(c * stride + at + v) {
+                *target = x[v][c];
+            }
         }
     }
 }
@@ -440,7 +490,25 @@ fn backward_tile<S: Simd, const V: usize>(
     at: usize,
     pivots: Option<&[f64; BLOCK * BLOCK]>,
 ) {
-    let columns = y.len() / stride;
+    let sum = transposed_product::<S, V>(simd, rows, x, block, y.len() / stride, stride, at);
+    let mut sum = subtract_from::<S, V>(simd, y, stride, at, &sum);
+    if let Some(pivots) = pivots {
+        divide_transposed(simd, &mut sum, pivots);
+    }
+    store::<S, V>(y, stride, at, &sum);
+}
+
+/// Sums over i of `rows[i][block column c] * x[i][at + v]`, for the first `columns` columns of the block.
+#[inline(always)]
+fn transposed_product<S: Simd, const V: usize>(
+    simd: S,
+    rows: RowBlocks,
+    x: &[S::f64s],
+    block: usize,
+    columns: usize,
+    stride: usize,
+    at: usize,
+) -> [[S::f64s; BLOCK]; V] {
     let start = BLOCK * BLOCK * block;
     let mut sum = [[simd.splat_f64s(0.0); BLOCK]; V];
     for (row, x) in rows.iter().zip(x.chunks(BLOCK * stride)) {
@@ -453,38 +521,36 @@ fn backward_tile<S: Simd, const V: usize>(
                 &padded
             }
         };
-        for (r, x) in x.chunks_exact(stride).enumerate().take(BLOCK) {
+        for (r, x) in x.chunks_exact(stride).enumerate() {
             let x: [S::f64s; V] = std::array::from_fn(|v| x[at + v]);
             for c in 0..BLOCK {
-                let factor = simd.splat_f64s(entries[BLOCK * c + (r & 7)]);
+                let factor = simd.splat_f64s(entries[BLOCK * c + (r % BLOCK)]);
                 for v in 0..V {
                     sum[v][c] = simd.mul_add_e_f64s(x[v], factor, sum[v][c]);
                 }
             }
         }
     }
-    for (c, row) in y.chunks_exact(stride).enumerate().take(BLOCK) {
+    sum
+}
+
+/// Solves `pivots^T * x = x` for the rows x[v][0..8].
+#[inline(always)]
+fn divide_transposed<S: Simd, const V: usize>(
+    simd: S,
+    x: &mut [[S::f64s; BLOCK]; V],
+    pivots: &[f64; BLOCK * BLOCK],
+) {
+    for c in (0..BLOCK).rev() {
+        let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
         for v in 0..V {
-            sum[v][c] = simd.sub_f64s(row[at + v], sum[v][c]);
+            x[v][c] = simd.mul_f64s(x[v][c], inverse);
         }
-    }
-    if let Some(pivots) = pivots {
-        for c in (0..BLOCK).rev() {
-            let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
+        for earlier in 0..c {
+            let factor = simd.splat_f64s(-pivots[BLOCK * earlier + c]);
             for v in 0..V {
-                sum[v][c] = simd.mul_f64s(sum[v][c], inverse);
+                x[v][earlier] = simd.mul_add_e_f64s(x[v][c], factor, x[v][earlier]);
             }
-            for earlier in 0..c {
-                let factor = simd.splat_f64s(-pivots[BLOCK * earlier + c]);
-                for v in 0..V {
-                    sum[v][earlier] = simd.mul_add_e_f64s(sum[v][c], factor, sum[v][earlier]);
-                }
-            }
-        }
-    }
-    for (c, row) in y.chunks_exact_mut(stride).enumerate().take(BLOCK) {
-        for v in 0..V {
-            row[at + v] = sum[v][c];
         }
     }
 }

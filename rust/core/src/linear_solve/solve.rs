@@ -18,6 +18,8 @@ const FORK: usize = 1 << 19;
 const FORK_COLUMNS: usize = 1000;
 /// Row blocks solved on one thread before the rest makes use of them.
 const PIVOT_BLOCKS: usize = 16;
+/// Row blocks the backward pass reads side by side, a block column at a time: as many as the hardware prefetches.
+const STREAMS: usize = 8;
 
 /// Solves for some right-hand sides; `x` (n, width) is filled in elimination order.
 pub(super) fn solve(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) {
@@ -39,6 +41,13 @@ pub(super) struct Columns<'a> {
 impl<'a> Columns<'a> {
     pub(super) fn row(&self, unknown: usize) -> &'a [f64] {
         &self.rhs[unknown * self.columns + self.first..][..self.count]
+    }
+
+    /// The first column that is not zero, unless it is not finite.
+    pub(super) fn nonzero_column(&self) -> Option<usize> {
+        let rows = 0..self.rhs.len() / self.columns;
+        let column = rows.clone().find_map(|unknown| self.row(unknown).iter().position(|&value| value != 0.0))?;
+        rows.map(|unknown| self.row(unknown)[column]).all(f64::is_finite).then_some(column)
     }
 
     /// Which of the columns are not zero, per unknown.
@@ -350,9 +359,12 @@ impl BackwardPass<'_> {
                 || self.subtract_later(rows, x, block + blocks / 2, right),
             );
         } else {
-            for (offset, y) in y.chunks_mut(BLOCK * self.width).enumerate() {
-                let block = block + offset;
-                self.arch.dispatch(Backward { rows, x, block, y, width: self.width, pivots: None });
+            let streams = rows.len().div_ceil(rows.len().div_ceil(STREAMS));
+            for (rows, x) in rows.chunks(streams).zip(x.chunks(streams * BLOCK * self.width)) {
+                for (offset, y) in y.chunks_mut(BLOCK * self.width).enumerate() {
+                    let block = block + offset;
+                    self.arch.dispatch(Backward { rows, x, block, y, width: self.width, pivots: None });
+                }
             }
         }
     }

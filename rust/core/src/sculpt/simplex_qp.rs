@@ -10,7 +10,7 @@ const MULTIPLIER_TOLERANCE: f64 = 4.0 * f64::EPSILON;
 /// Minimise 1/2 w'Hw - g'w over w >= 0, sum w = `mass`. Only the first `n <= N` unknowns take part.
 #[derive(Debug, Clone, Copy)]
 pub struct SimplexQp<const N: usize> {
-    /// H, symmetric positive definite; only the lower triangle is read.
+    /// H, symmetric positive definite.
     pub h: [[f64; N]; N],
     /// g.
     pub g: [f64; N],
@@ -20,15 +20,19 @@ pub struct SimplexQp<const N: usize> {
     pub mass: f64,
 }
 
+/// A face of the simplex: which unknowns are not held at zero.
+type Face<const N: usize> = [bool; N];
+
 impl<const N: usize> SimplexQp<N> {
-    /// Takes a feasible start to the minimiser. Every step is downhill: the answer is never worse than the start.
+    /// Takes a feasible start (zero beyond `n`) to the minimiser. Every step is downhill: the answer is never worse than
+    /// the start.
     pub fn minimise(&self, w: &mut [f64; N]) {
         let mut face = self.face_of(w);
         let mut released = false;
         // A strictly convex problem visits no face twice; the bound only guards against rounding.
         for _ in 0..16 * N {
             let (goal, multiplier) = self.minimum_on(&face);
-            let step = face.step_towards(&goal, w);
+            let step = step_towards(&goal, &face, w);
             if released && step == 0.0 {
                 return;
             }
@@ -38,7 +42,7 @@ impl<const N: usize> SimplexQp<N> {
                 continue;
             }
             match self.best_release(&face, multiplier, w) {
-                Some(unknown) => face.insert(unknown),
+                Some(unknown) => face[unknown] = true,
                 None => return,
             }
             released = true;
@@ -46,64 +50,56 @@ impl<const N: usize> SimplexQp<N> {
     }
 
     fn face_of(&self, w: &[f64; N]) -> Face<N> {
-        let mut face = Face { members: [0; N], len: 0 };
-        for i in (0..self.n.min(N)).filter(|&i| w[i] > 0.0) {
-            face.insert(i);
-        }
-        face
+        std::array::from_fn(|i| i < self.n && w[i] > 0.0)
     }
 
-    fn entry(&self, i: usize, j: usize) -> f64 {
-        self.h[i.max(j)][i.min(j)]
-    }
-
-    /// The minimiser on a face under the sum constraint alone, by position in the face, and that constraint's
-    /// multiplier m: H w = g - m, so w = H^-1 g - m H^-1 1.
+    /// The minimiser on a face under the sum constraint alone, and that constraint's multiplier m:
+    /// H w = g - m, so w = H^-1 g - m H^-1 1.
+    ///
+    /// Unknowns off the face get rows of the identity instead of being left out: no index is looked up, and the
+    /// compiler unrolls everything for small N. The factorisation is the root-free one, H = L D L'.
     #[inline]
     fn minimum_on(&self, face: &Face<N>) -> ([f64; N], f64) {
-        let len = face.len.min(N);
-        let mut l = [[0.0; N]; N]; // Cholesky factor; the diagonal holds the reciprocals
-        let (mut a, mut b) = ([0.0; N], [0.0; N]);
-        for i in 0..len {
-            let row = face.members[i];
-            let (mut pivot, mut x, mut y) = (self.h[row][row], self.g[row], 1.0);
+        let on_face: [f64; N] = face.map(|free| f64::from(u8::from(free)));
+        let mut l = [[0.0; N]; N]; // below the diagonal L, on it 1 / D
+        let (mut a, mut b) = ([0.0; N], on_face);
+        for i in (0..N).filter(|&i| face[i]) {
+            let mut scaled = [0.0; N]; // row i of L D
             for j in 0..i {
-                let known: f64 = l[i].iter().zip(&l[j]).take(j).map(|(x, y)| x * y).sum();
-                let entry = (self.entry(row, face.members[j]) - known) * l[j][j];
-                l[i][j] = entry;
-                pivot -= entry * entry;
-                x -= entry * a[j];
-                y -= entry * b[j];
+                let known: f64 = (0..j).map(|k| scaled[k] * l[j][k]).sum();
+                scaled[j] = on_face[j] * self.h[i][j] - known;
             }
-            let reciprocal = 1.0 / pivot.max(f64::MIN_POSITIVE).sqrt();
-            l[i][i] = reciprocal;
-            a[i] = x * reciprocal;
-            b[i] = y * reciprocal;
+            let mut pivot = self.h[i][i];
+            a[i] = self.g[i];
+            for k in 0..i {
+                l[i][k] = scaled[k] * l[k][k];
+                pivot -= scaled[k] * l[i][k];
+                a[i] -= l[i][k] * a[k];
+                b[i] -= l[i][k] * b[k];
+            }
+            l[i][i] = 1.0 / pivot.max(f64::MIN_POSITIVE);
         }
-        for i in (0..len).rev() {
-            for k in i + 1..len {
+        for i in (0..N).rev() {
+            a[i] *= l[i][i];
+            b[i] *= l[i][i];
+            for k in i + 1..N {
                 a[i] -= l[k][i] * a[k];
                 b[i] -= l[k][i] * b[k];
             }
-            a[i] *= l[i][i];
-            b[i] *= l[i][i];
         }
         let multiplier = (a.iter().sum::<f64>() - self.mass) / b.iter().sum::<f64>();
-        for i in 0..len {
-            a[i] -= multiplier * b[i];
-        }
-        (a, multiplier)
+        (std::array::from_fn(|i| a[i] - multiplier * b[i]), multiplier)
     }
 
     /// The unknown held at zero whose release brings the objective down fastest, if any does.
     #[inline]
     fn best_release(&self, face: &Face<N>, multiplier: f64, w: &[f64; N]) -> Option<usize> {
-        let trace: f64 = (0..self.n).map(|i| self.h[i][i]).sum();
+        let trace: f64 = (0..N).map(|i| self.h[i][i]).sum();
         let (mut lowest, mut found) = (-MULTIPLIER_TOLERANCE * trace, None);
-        for j in (0..self.n).filter(|&j| !face.members().contains(&j)) {
-            let slope: f64 = face.members().iter().map(|&i| self.entry(i, j) * w[i]).sum();
+        for j in 0..N {
+            let slope: f64 = self.h[j].iter().zip(w).map(|(h, w)| h * w).sum();
             let bound_multiplier = slope - self.g[j] + multiplier;
-            if bound_multiplier < lowest {
+            if bound_multiplier < lowest && j < self.n && !face[j] {
                 (lowest, found) = (bound_multiplier, Some(j));
             }
         }
@@ -111,32 +107,16 @@ impl<const N: usize> SimplexQp<N> {
     }
 }
 
-/// The unknowns that are not held at zero.
-struct Face<const N: usize> {
-    members: [usize; N],
-    len: usize,
-}
-
-impl<const N: usize> Face<N> {
-    fn insert(&mut self, unknown: usize) {
-        self.members[self.len] = unknown;
-        self.len += 1;
-    }
-
-    fn members(&self) -> &[usize] {
-        &self.members[..self.len]
-    }
-
-    /// Moves `w` towards `goal` until a bound blocks, and says how much of the way it went.
-    #[inline]
-    fn step_towards(&self, goal: &[f64; N], w: &mut [f64; N]) -> f64 {
-        let reach = |w: f64, x: f64| if x < 0.0 { w / (w - x) } else { 1.0 };
-        let pairs = || self.members().iter().zip(goal);
-        let step = pairs().map(|(&i, &x)| reach(w[i], x)).fold(1.0, f64::min);
-        for (&i, &x) in pairs() {
-            let blocks = x < 0.0 && reach(w[i], x) <= step;
-            w[i] = if blocks { 0.0 } else { (w[i] + step * (x - w[i])).max(0.0) };
+/// Moves `w` towards `goal` until a bound blocks, and says how much of the way it went.
+#[inline]
+fn step_towards<const N: usize>(goal: &[f64; N], face: &Face<N>, w: &mut [f64; N]) -> f64 {
+    let reach: [f64; N] = std::array::from_fn(|i| if face[i] && goal[i] < 0.0 { w[i] / (w[i] - goal[i]) } else { 1.0 });
+    let step = reach.iter().copied().fold(1.0, f64::min);
+    for i in 0..N {
+        let blocks = face[i] && goal[i] < 0.0 && reach[i] <= step;
+        if face[i] {
+            w[i] = if blocks { 0.0 } else { (w[i] + step * (goal[i] - w[i])).max(0.0) };
         }
-        step
     }
+    step
 }

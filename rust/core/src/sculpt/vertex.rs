@@ -93,21 +93,19 @@ impl SculptSolver {
 
     /// H = sum of alpha E'E over targets and guards, members free ones first.
     fn quadratic<const N: usize>(&self, i: usize, members: &FreeFirst<N>) -> [[f64; N]; N] {
-        let mut h = [[0.0; N]; N];
-        for (a, row) in h.iter_mut().enumerate().take(members.len) {
-            for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
-                *entry = self.guards.entry(i, members.order[a], members.order[b]);
-            }
-        }
+        let order = &members.order;
+        let held = |a: usize, b: usize| self.guards.entry(i, order[a], order[b]);
+        let is_member = |a: usize| a < members.len;
+        let mut h: [[f64; N]; N] = std::array::from_fn(|a| {
+            std::array::from_fn(|b| if is_member(a) && is_member(b) { held(a, b) } else { 0.0 })
+        });
         for target in &self.targets[i] {
             let pose = &self.poses[target.pose];
             let mut offsets = [DVec3::ZERO; N];
             self.offsets(i, &pose.pose_from_rest, target.position, &mut offsets);
-            let e = members.order.map(|a| offsets[a]);
-            for (a, row) in h.iter_mut().enumerate().take(members.len) {
-                for (b, entry) in row.iter_mut().enumerate().take(a + 1) {
-                    *entry += pose.alpha * e[a].dot(e[b]);
-                }
+            let e = order.map(|a| offsets[a]);
+            for (row, e_a) in h.iter_mut().zip(e) {
+                row.iter_mut().zip(e).for_each(|(entry, e_b)| *entry += pose.alpha * e_a.dot(e_b));
             }
         }
         h
@@ -116,18 +114,13 @@ impl SculptSolver {
     /// Proximal passes over the free members; the locked ones only shift the linear term.
     fn minimise<const N: usize>(&self, h: [[f64; N]; N], members: &FreeFirst<N>, mass: f64, w: &mut [f64; N]) {
         let pull = self.options.kappa * self.options.kappa;
-        let mut shift = [0.0; N];
-        for (a, s) in shift.iter_mut().enumerate().take(members.free) {
-            *s = (members.free..members.len).map(|b| -h[b][a] * w[b]).sum();
-        }
+        let locked = members.free..members.len;
+        let shift: [f64; N] = std::array::from_fn(|a| locked.clone().map(|b| -h[a][b] * w[b]).sum());
         let mut qp = SimplexQp { h, g: shift, n: members.free, mass };
-        for a in 0..members.free {
-            qp.h[a][a] += pull;
-        }
+        (0..N).for_each(|a| qp.h[a][a] += pull);
+        w[locked].fill(0.0);
         for _ in 0..self.options.passes {
-            for a in 0..members.free {
-                qp.g[a] = shift[a] + pull * w[a];
-            }
+            qp.g = std::array::from_fn(|a| shift[a] + pull * w[a]);
             qp.minimise(w);
         }
     }

@@ -9,6 +9,7 @@ pub mod islands;
 pub mod limit;
 pub mod matching;
 mod prepared;
+mod problem;
 mod report;
 pub mod smooth;
 mod source;

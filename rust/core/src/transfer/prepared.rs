@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use super::inpaint::{Block, BlockWeights};
 use super::islands::Scene;
 use super::matching::Closest;
+use super::problem::Problem;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
 use super::system::{independent_blocks, number_unknowns};
-use super::{Criteria, Length, MaskValue, Settings, Source, Transfer, limit, smooth};
+use super::{Criteria, MaskValue, Settings, Source, Transfer, limit, smooth};
 use crate::adjacency::{Islands, NONE, clean_triangles};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -23,14 +24,14 @@ use crate::weights::Weights;
 /// changing smoothing, limit, policy or the source's weights factors nothing.
 #[derive(Debug)]
 pub struct Inpainting {
-    source: Source,
+    pub(super) source: Source,
     positions: Vec<[f32; 3]>,
     /// Without repeated vertices and duplicates.
     triangles: Vec<[u32; 3]>,
-    diagonal: f64,
-    islands: Islands,
+    pub(super) diagonal: f64,
+    pub(super) islands: Islands,
     laplacian: Laplacian,
-    closest: Closest,
+    pub(super) closest: Closest,
     blocks: Vec<Block>,
     preparation: Vec<(&'static str, f64)>,
 }
@@ -42,15 +43,6 @@ pub struct RawWeights {
     pub vertices: Vec<u32>,
     /// Weights, (U, bones) row-major.
     pub values: Vec<f64>,
-}
-
-/// Unknowns and lengths of one solve.
-struct Problem {
-    criteria: Criteria,
-    smoothness_length: f64,
-    matched: Vec<bool>,
-    has_match: Vec<bool>,
-    unknown: Vec<bool>,
 }
 
 impl Inpainting {
@@ -133,7 +125,7 @@ impl Inpainting {
     /// [`Error::LengthMismatch`], [`Error::Cancelled`]. A failed solve leaves the kept blocks usable.
     pub fn solve(&mut self, mask: Option<&[MaskValue]>, settings: &Settings, progress: &Progress) -> Result<Transfer> {
         let mut stages = Stages::start();
-        let problem = self.pose(mask, settings)?;
+        let problem = Problem::new(self, mask, settings)?;
         let factored_blocks = self.factor(&problem, progress)?;
         stages.end("factor");
         let solutions = self.solve_blocks(progress)?;
@@ -152,10 +144,17 @@ impl Inpainting {
             factored_blocks,
             source_unweighted,
             source_unnormalised,
+            matched: count(&problem.matched),
+            inpainted: count(&problem.unknown),
+            loose: self.islands.of_vertex().iter().filter(|&&island| island == NONE).count(),
+            islands: self.islands.count(),
+            blocks: self.blocks.len(),
+            max_distance: problem.criteria.max_distance,
+            smoothness_length: problem.smoothness_length,
             raw_minimum: raw_minimum(&solutions),
             largest_residual: solutions.iter().map(|s| s.residual).fold(0.0, f64::max),
             seconds: self.preparation.iter().copied().chain(stages.into_seconds()).collect(),
-            ..self.counts(&problem, &weights)
+            ..Report::of_weights(&weights)
         };
         progress.report(1.0);
         Ok(Transfer { weights, matched: problem.matched, report })
@@ -166,7 +165,7 @@ impl Inpainting {
     /// # Errors
     /// Those of [`Inpainting::solve`].
     pub fn raw_weights(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<RawWeights> {
-        let problem = self.pose(mask, settings)?;
+        let problem = Problem::new(self, mask, settings)?;
         let progress = Progress::default();
         self.factor(&problem, &progress)?;
         let solutions = self.solve_blocks(&progress)?;
@@ -184,7 +183,7 @@ impl Inpainting {
         Ok(RawWeights { vertices, values })
     }
 
-    fn criteria(&self, settings: &Settings) -> Criteria {
+    pub(super) fn criteria(&self, settings: &Settings) -> Criteria {
         Criteria {
             max_distance: settings.max_distance.of(self.diagonal),
             max_normal_angle: settings.max_normal_angle,
@@ -198,37 +197,6 @@ impl Inpainting {
             Some(found) if found != expected => Err(Error::LengthMismatch { what: "mask", found, expected }),
             _ => Ok(()),
         }
-    }
-
-    /// Decides who is matched, unknown, or on an island without a match.
-    fn pose(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Problem> {
-        let matched = self.matched(mask, settings)?;
-        let criteria = self.criteria(settings);
-        let of_vertex = self.islands.of_vertex();
-        let mut has_match = vec![false; self.islands.count()];
-        for (&island, _) in std::iter::zip(of_vertex, &matched).filter(|&(&island, &m)| m && island != NONE) {
-            has_match[island as usize] = true;
-        }
-        if !has_match.contains(&true) {
-            return Err(self.nothing_matched(&criteria, mask, settings));
-        }
-        let is_unknown = |(&island, &m): (&u32, &bool)| !m && island != NONE && has_match[island as usize];
-        let unknown = std::iter::zip(of_vertex, &matched).map(is_unknown).collect();
-        let smoothness_length = settings.smoothness_length.of(self.source.diagonal());
-        Ok(Problem { criteria, smoothness_length, matched, has_match, unknown })
-    }
-
-    fn nothing_matched(&self, criteria: &Criteria, mask: Option<&[MaskValue]>, settings: &Settings) -> Error {
-        let needed = self.closest.smallest_matching_distance(criteria, mask);
-        let relative = |needed: f64| match settings.max_distance {
-            Length::Relative(_) => format!(" ({:.4} of the target's diagonal)", needed / self.diagonal),
-            Length::Absolute(_) => String::new(),
-        };
-        let advice = match needed {
-            Some(needed) => format!("the smallest distance that matches something is {needed:.6}{}", relative(needed)),
-            None => "no distance would help: check the mask, the largest normal angle and the source's weights".into(),
-        };
-        Error::NothingMatched { max_distance: criteria.max_distance, needed, advice }
     }
 
     /// Brings the kept blocks in line with `problem`; returns how many had to be factored.
@@ -310,27 +278,10 @@ impl Inpainting {
             max_distance: problem.criteria.max_distance,
         }
     }
+}
 
-    fn counts(&self, problem: &Problem, weights: &Weights) -> Report {
-        let count = |flags: &[bool]| flags.iter().filter(|&&flag| flag).count();
-        let influences = || weights.indptr().windows(2).map(|w| (w[1] - w[0]) as usize);
-        let mut used = vec![false; weights.n_bones() as usize];
-        weights.bones().iter().for_each(|&bone| used[bone as usize] = true);
-        Report {
-            vertices: self.positions.len(),
-            matched: count(&problem.matched),
-            inpainted: count(&problem.unknown),
-            loose: self.islands.of_vertex().iter().filter(|&&island| island == NONE).count(),
-            unweighted: influences().filter(|&n| n == 0).count(),
-            islands: self.islands.count(),
-            blocks: self.blocks.len(),
-            bones_used: count(&used),
-            most_influences: influences().max().unwrap_or(0),
-            max_distance: problem.criteria.max_distance,
-            smoothness_length: problem.smoothness_length,
-            ..Report::default()
-        }
-    }
+fn count(flags: &[bool]) -> usize {
+    flags.iter().filter(|&&flag| flag).count()
 }
 
 fn raw_minimum(solutions: &[BlockWeights]) -> f64 {

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::UnmatchedIsland;
+use crate::weights::Weights;
 
 /// Counts, islands and seconds of one transfer.
 #[derive(Debug, Clone, Default)]
@@ -43,6 +44,22 @@ pub struct Report {
     pub smoothness_length: f64,
     /// Stage and wall seconds, in order.
     pub seconds: Vec<(&'static str, f64)>,
+}
+
+impl Report {
+    /// The counts that the resulting weights alone tell.
+    pub(super) fn of_weights(weights: &Weights) -> Self {
+        let influences = || weights.indptr().windows(2).map(|w| (w[1] - w[0]) as usize);
+        let mut used = vec![false; weights.n_bones() as usize];
+        weights.bones().iter().for_each(|&bone| used[bone as usize] = true);
+        Self {
+            vertices: weights.vertex_count(),
+            unweighted: influences().filter(|&n| n == 0).count(),
+            bones_used: used.into_iter().filter(|&used| used).count(),
+            most_influences: influences().max().unwrap_or(0),
+            ..Self::default()
+        }
+    }
 }
 
 /// A stopwatch over consecutive stages.
