@@ -59,7 +59,7 @@ def _solve(
 ) -> Rows:
     """Bones that do not deform take part as steps of the hierarchy, but are given to no vertex."""
     locked = ~deforming | np.isin(names, sorted(vertex_groups.locked(obj)))
-    shape = {}
+    shape: dict[str, NDArray] = {}
     if params.method == "surface":
         shape["positions"], shape["triangles"] = mesh.rest_positions(obj.data), mesh.triangles(obj)
         shape["bone_segments"] = armature.segments(obj, rig, names)

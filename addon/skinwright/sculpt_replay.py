@@ -1,8 +1,8 @@
 """Recorded or synthetic sculpts from a file, for studios and for tests.
 
-An .npz file holds one sculpt a pose: `positions` (S, V, 3), where each vertex is to be in the mesh' own space, NaN where
-it was not touched; and the poses, either `frames` (S,) of the scene, or `bones` (B,) with `matrices` (S, B, 4, 4), the
-`matrix_basis` of these pose bones.
+An .npz file holds one sculpt a pose: `positions` (S, V, 3), where each vertex is to be in the mesh' own space, NaN
+where it was not touched; and the poses, either `frames` (S,) of the scene, or `bones` (B,) with `matrices`
+(S, B, 4, 4), the `matrix_basis` of these pose bones.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .reporting import SculptReport
-from .scene import armature, poses
+from .scene import poses
 from .scene.error import SceneError
 from .sculpt_session import SculptOptions, SculptSession
 
@@ -57,7 +57,7 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptOptions) -> S
         raise SceneError(f"{obj.name} has {len(obj.data.vertices)} vertices, but {n} were sculpted: use the same mesh")
     session = SculptSession(obj, options)
     try:
-        for number in _poses(obj, sculpts):
+        for number in _poses(bpy.data.objects[session.rig_name], sculpts):
             positions = sculpts["positions"][number]
             touched = np.flatnonzero(np.isfinite(positions).all(axis=1))
             session.sculpt(touched, positions[touched].astype(np.float32))
@@ -67,10 +67,9 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptOptions) -> S
     return session.commit()
 
 
-def _poses(obj: bpy.types.Object, sculpts: Sculpts) -> Iterator[int]:
+def _poses(rig: bpy.types.Object, sculpts: Sculpts) -> Iterator[int]:
     if "frames" in sculpts:
         return poses.frames(sculpts["frames"].tolist())
-    rig = armature.find(obj)
     names = sculpts["bones"].tolist()
     missing = [name for name in names if name not in rig.pose.bones]
     if missing:
@@ -87,7 +86,7 @@ def options_from_json(settings: Any) -> SculptOptions:
         if name not in known:
             raise ValueError(f"there is no setting {name}; there are {', '.join(sorted(known))}")
         kind: Any = known[name]
-        accepted = {float: (int, float), int: int}.get(kind, str)
+        accepted: Any = {float: (int, float), int: int}.get(kind, str)
         choices = get_args(kind) if get_origin(kind) else ()
         if isinstance(value, bool) or not isinstance(value, accepted) or (choices and value not in choices):
             raise ValueError(f"setting {name} cannot be {value!r}")

@@ -206,7 +206,8 @@ class SculptSession:
     def commit(self) -> SculptReport:
         """Keep the weights, and what they cannot reach if that is wanted."""
         obj = self._found()
-        keys, warnings = [], []
+        keys: list[str] = []
+        warnings: list[str] = []
         if self.options.residual == "SHAPE_KEY":
             for pose in sorted(self._rotations):
                 keys += self._correct(obj, pose, warnings)

@@ -17,7 +17,7 @@ from ..scene import changes, mesh, sculpting
 from ..scene.error import SceneError
 from ..sculpt_session import SculptSession
 
-TICK_SECONDS = 0.05
+TICK_SECONDS = 0.02
 # While posing between strokes, Object and Pose mode belong to the session too.
 MODES = {"SCULPT", "OBJECT", "POSE"}
 MOST_STEPS = 1000
@@ -32,6 +32,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     asked_to_end = ""
+    _session: SculptSession
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -48,7 +49,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             if obj.mode != "SCULPT":
                 bpy.ops.object.mode_set(mode="SCULPT")
             _mark(obj)
-            sculpt_session.current = SculptSession(obj, _options(context))
+            self._session = sculpt_session.current = SculptSession(obj, _options(context))
         except (SceneError, native.NativeError) as error:
             if obj.mode != self._mode:
                 bpy.ops.object.mode_set(mode=self._mode)
@@ -65,8 +66,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
 
     def modal(self, context: Context, event: Event) -> set[str]:
         """Everything but undo, Enter and Esc is the brushes' and the view's."""
-        session = sculpt_session.current
-        obj = session.target()
+        session, obj = self._session, self._session.target()
         if obj is None:
             self.cancel(context)
             self.report({"WARNING"}, f"{session.target_name} or its armature is gone: sculpting has ended")
@@ -85,7 +85,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
 
     def _look(self, context: Context) -> None:
         """Turn into weights what has moved since the last look."""
-        session = sculpt_session.current
+        session = self._session
         if self._seen == changes.version:
             return
         self._seen = changes.version
@@ -105,7 +105,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             _show(context, f"{outcome.vertices} vertices, {outcome.reachability:.0%} reached")
 
     def _step(self, context: Context, asked: str) -> None:
-        session = sculpt_session.current
+        session = self._session
         done = session.undo() if asked == "UNDO" else session.redo()
         if done:
             _show(context, f"{session.stroke_count} strokes")
@@ -113,15 +113,17 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             _show(context, f"nothing to {asked.lower()}")
 
     def _end(self, context: Context, keep: bool) -> set[str]:
-        session = sculpt_session.current
+        session = self._session
         if context.mode == "SCULPT":
             self._look(context)  # a stroke may have ended just now
             if self._steps_to_undo and not self._left:
                 _take_back_steps(context, session.target_name)
         self.cancel(context)
         with mesh.object_mode(context):
-            session.target().skinwright.sculpting = False
-            self._keep(session) if keep else session.cancel()
+            obj = session.target()
+            if obj:
+                obj.skinwright.sculpting = False
+                self._keep(session) if keep else session.cancel()
         if not keep:
             self.report({"INFO"}, "Weights and shape are as they were")
         if context.mode == "SCULPT" and self._mode != "SCULPT":

@@ -8,7 +8,8 @@ def _transfer_weights(menu: Menu, _context: Context) -> None:
     menu.layout.operator("skinwright.transfer_weights", text="Transfer Weights (Skinwright)")
 
 
-def _desparsify(menu: Menu, _context: Context) -> None:
+def _paint_weight(menu: Menu, context: Context) -> None:
+    _transfer_weights(menu, context)
     menu.layout.operator("skinwright.desparsify", text="Desparsify Weights (Skinwright)")
 
 
@@ -18,8 +19,7 @@ def _sculpt_weights(menu: Menu, _context: Context) -> None:
 
 
 ENTRIES = (
-    (VIEW3D_MT_paint_weight, _transfer_weights),
-    (VIEW3D_MT_paint_weight, _desparsify),
+    (VIEW3D_MT_paint_weight, _paint_weight),
     (VIEW3D_MT_make_links, _transfer_weights),
     (VIEW3D_MT_sculpt, _sculpt_weights),
 )

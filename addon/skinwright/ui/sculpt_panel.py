@@ -4,6 +4,7 @@ import bpy
 from bpy.types import Context, Panel, UILayout
 
 from .. import sculpt_session
+from ..sculpt_session import SculptSession
 from .panel import Tab
 
 
@@ -18,7 +19,7 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
         layout = self.layout
         settings = context.scene.skinwright.sculpt
         if sculpt_session.current:
-            _draw_state(layout)
+            _draw_state(layout, sculpt_session.current)
         else:
             layout.operator("skinwright.sculpt_weights", icon="SCULPTMODE_HLT")
             layout.operator("skinwright.desparsify", icon="GROUP_VERTEX")
@@ -29,8 +30,7 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
         button.data_path, button.value = "scene.skinwright.overlay.kind", "NONE" if shown else "INFLUENCES"
 
 
-def _draw_state(layout: UILayout) -> None:
-    session = sculpt_session.current
+def _draw_state(layout: UILayout, session: SculptSession) -> None:
     row = layout.row(align=True)
     row.operator("skinwright.end_sculpt_weights", text="Keep", icon="CHECKMARK").keep = True
     row.operator("skinwright.end_sculpt_weights", text="Cancel", icon="X").keep = False
