@@ -543,11 +543,7 @@ fn transposed_product<S: Simd, const V: usize>(
 
 /// Solves `pivots^T * x = x` for the rows x[v][0..8].
 #[inline(always)]
-fn divide_transposed<S: Simd, const V: usize>(
-    simd: S,
-    x: &mut [[S::f64s; BLOCK]; V],
-    pivots: &[f64; BLOCK * BLOCK],
-) {
+fn divide_transposed<S: Simd, const V: usize>(simd: S, x: &mut [[S::f64s; BLOCK]; V], pivots: &[f64; BLOCK * BLOCK]) {
     for c in (0..BLOCK).rev() {
         let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
         for v in 0..V {
