@@ -18,6 +18,7 @@ def steps(window: Window) -> Steps:
     jobs = import_module(f"{EXTENSION}.jobs")
     _, figure, garment = dress.build(100_000, 60)
     bpy.context.scene.skinwright.transfer.source = figure
+    bpy.context.scene.skinwright.transfer.smoothing_iterations = 150
     # Without a graphics card, drawing the mesh once takes as long as the transfer.
     figure.display_type = garment.display_type = "BOUNDS"
     with window.context():
@@ -51,6 +52,7 @@ def steps(window: Window) -> Steps:
 
     _, figure, garment = dress.build(2500)
     bpy.context.scene.skinwright.transfer.source = figure
+    bpy.context.scene.skinwright.transfer.smoothing_iterations = 0
     bpy.context.scene.skinwright.overlay.kind = "INFLUENCES"
     look(window)
     yield 0.3
