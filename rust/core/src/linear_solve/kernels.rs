@@ -85,7 +85,14 @@ impl WithSimd for Eliminate<'_, '_, '_> {
                 let before = pivot_row[BLOCK * BLOCK * first..start].as_chunks().0;
                 match rows {
                     [r0, r1, r2] if S::F64_LANES == BLOCK => {
-                        eliminate_tile::<S, 3>(simd, [r0, r1, r2].map(|row| &mut row[skip..]), 0, before, &pivot, width);
+                        eliminate_tile::<S, 3>(
+                            simd,
+                            [r0, r1, r2].map(|row| &mut row[skip..]),
+                            0,
+                            before,
+                            &pivot,
+                            width,
+                        );
                     }
                     _ => {
                         for row in rows.iter_mut() {
