@@ -16,6 +16,6 @@ def test_long_work_shows_progress_and_esc_stops_it(blender):
 
 
 def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
-    seen = blender.run("sculpt_weights", timeout=300)
+    seen = blender.run("sculpt_weights", timeout=300, size=(1000, 900))
     assert seen["strokes"] == 2
     assert 0 < seen["reachability"] <= 1

@@ -160,7 +160,8 @@ def test_undo_and_redo_go_stroke_by_stroke(sculpt, body, rig):
 def test_cancel_brings_everything_back_bit_for_bit(sculpt, body, keys):
     if keys:
         body.shape_key_add(name="Basis", from_mix=False)
-        body.shape_key_add(name="Smile", from_mix=False).data[3].co.z += 0.2
+        smile = body.shape_key_add(name="Smile", from_mix=False)
+        smile.data[3].co.z, smile.value = 0.2, 0.0
         body.active_shape_key_index = 0
     body.vertex_groups.active_index = 2
     body.vertex_groups.remove(body.vertex_groups["Toe"])

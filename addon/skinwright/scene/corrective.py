@@ -16,7 +16,7 @@ def add(
         obj.shape_key_add(name="Basis", from_mix=False)
     basis = obj.data.shape_keys.reference_key
     key = obj.shape_key_add(name=name, from_mix=False)
-    key.relative_key = basis
+    key.relative_key, key.value = basis, 0.0  # in Blender 5.2 new keys are on
     positions = scene_mesh.vectors(basis.data, "co")
     positions[vertices] += offsets
     key.data.foreach_set("co", positions.ravel())

@@ -41,7 +41,7 @@ def steps(window: Window) -> Steps:
     yield 0.5
     enable()
     watch()
-    for vertices, size in ((int(argument), 30) for argument in sys.argv[sys.argv.index("--") + 1 :]):
+    for vertices, size in ((int(argument), 52) for argument in sys.argv[sys.argv.index("--") + 1 :]):
         obj = character(window, vertices, BONES)
         window.area.spaces.active.overlay.show_overlays = False
         yield 0.5
