@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use pulp::Arch;
 
-use super::blocks::{BLOCK, panel_index, triangle_len};
+use super::blocks::{BLOCK, panel_index};
 use super::buffer::Buffer;
 use super::graph::Graph;
-use super::kernels::{Eliminate, Pivot, Product};
+use super::kernels::{AddRuns, Eliminate, Pivot, Product, Run};
 use super::tree::{Front, Tree};
 use super::walk::{Plan, Received, Visit, walk};
 use super::{NotPositive, pivot_floor};
@@ -59,14 +59,20 @@ impl Visit for Factor<'_> {
     ) -> Result<(), NotPositive> {
         let front = &self.tree.fronts[index];
         self.assemble(front, panel);
-        let children: Vec<Child> = front.children.iter().map(|&child| self.child(child, front, &received)).collect();
-        for child in &children {
-            child.add_to_panel(front.columns, panel);
-        }
+        let children: Vec<Child> = front
+            .children
+            .iter()
+            .map(|&index| {
+                let child = &self.tree.fronts[index];
+                Child::new(self.arch, &child.in_parent, front.columns, received.from(index, child.update_len()))
+            })
+            .collect();
+        let mut rows = row_blocks(panel, front.columns);
         if front.columns == 0 {
             update.fill(0.0);
+        } else {
+            children.iter().for_each(|child| child.add_to_panel(&mut rows));
         }
-        let mut rows = row_blocks(panel, front.columns);
         self.eliminate_columns(front, &mut rows)?;
         let lower: Vec<&[f64]> = rows[front.columns.div_ceil(BLOCK)..].iter().map(|row| &**row).collect();
         let mut update = update_blocks(update);
@@ -93,18 +99,6 @@ impl Factor<'_> {
                 };
                 panel[panel_index(front.columns, row, column)] = value;
             }
-        }
-    }
-
-    fn child<'r>(&'r self, index: usize, parent: &Front, received: &Received<'r>) -> Child<'r> {
-        let child = &self.tree.fronts[index];
-        let inside = child.in_parent.partition_point(|&place| (place as usize) < parent.columns);
-        let column = |&place: &u32| BLOCK as u32 * (place - parent.columns as u32);
-        Child {
-            in_parent: &child.in_parent,
-            inside,
-            outside: child.in_parent[inside..].iter().map(column).collect(),
-            update: received.from(index, child.update_len()),
         }
     }
 
@@ -207,45 +201,54 @@ fn middle_row(first: usize, count: usize, most: usize) -> usize {
 
 /// An update on its way into the parent's front.
 struct Child<'a> {
-    in_parent: &'a [u32],
-    /// Number of its rows that are columns of the parent.
+    arch: Arch,
+    /// Number of columns of the parent, and of rows of the update that are among them.
+    columns: usize,
     inside: usize,
-    /// Where the columns of its other rows start in a row block of the parent's update.
-    outside: Vec<u32>,
+    /// Place of each row among the parent's columns and rows.
+    in_parent: &'a [u32],
+    /// Where each column starts in a row block of the parent: of its panel for the first `inside`, else of its update.
+    starts: Vec<u32>,
     update: &'a [f64],
 }
 
-impl Child<'_> {
-    /// Row `i` of the update, as blocks of eight rows of which lane `i % 8` is meant.
-    fn row(&self, i: usize) -> &[[f64; BLOCK]] {
-        self.update[triangle_len(i / BLOCK)..].as_chunks().0
+impl<'a> Child<'a> {
+    fn new(arch: Arch, in_parent: &'a [u32], columns: usize, update: &'a [f64]) -> Self {
+        let inside = in_parent.partition_point(|&place| (place as usize) < columns);
+        let start =
+            |&place: &u32| BLOCK as u32 * if (place as usize) < columns { place } else { place - columns as u32 };
+        Self { arch, columns, inside, in_parent, starts: in_parent.iter().map(start).collect(), update }
     }
 
-    /// Adds the columns that the parent eliminates.
-    fn add_to_panel(&self, columns: usize, panel: &mut [f64]) {
-        let rows = if self.inside == 0 { &[] } else { self.in_parent };
-        for (i, &place) in rows.iter().enumerate() {
-            let start = panel_index(columns, place as usize, 0);
-            let row = &mut panel[start..];
-            for (&column, values) in self.in_parent[..self.inside.min(i + 1)].iter().zip(self.row(i)) {
-                row[BLOCK * column as usize] += values[i % BLOCK];
-            }
-        }
+    /// Adds the columns that the parent eliminates to the row blocks of its panel.
+    fn add_to_panel(&self, panel: &mut [&mut [f64]]) {
+        let runs = self.runs(0..self.in_parent.len(), 0);
+        let columns = &self.starts[..self.inside];
+        self.arch.dispatch(AddRuns { update: self.update, runs: &runs, first: 0, columns, target: panel });
     }
 
-    /// Adds the rest to the row blocks `update` of the parent's update, of which `first` is the first.
-    fn add_to_update(&self, update: &mut [&mut [f64]], first: usize) {
-        let span = (BLOCK * BLOCK * first) as u32..(BLOCK * BLOCK * (first + update.len())) as u32;
-        let start = self.outside.partition_point(|&row| row < span.start);
-        let end = self.outside.partition_point(|&row| row < span.end);
-        for row in start..end {
-            let i = self.inside + row;
-            let place = self.outside[row] as usize / BLOCK;
-            let target = &mut update[place / BLOCK - first][place % BLOCK..];
-            for (&column, values) in self.outside[..=row].iter().zip(&self.row(i)[self.inside..]) {
-                target[column as usize] += values[i % BLOCK];
+    /// Adds the rest to the row blocks `target` of the parent's update, of which `first` is the first.
+    fn add_to_update(&self, target: &mut [&mut [f64]], first: usize) {
+        let row =
+            |block: usize| self.in_parent.partition_point(|&place| (place as usize) < self.columns + BLOCK * block);
+        let runs = self.runs(row(first)..row(first + target.len()), self.columns.div_ceil(BLOCK) + first);
+        let columns = &self.starts[self.inside..];
+        self.arch.dispatch(AddRuns { update: self.update, runs: &runs, first: self.inside, columns, target });
+    }
+
+    /// Splits `rows` of the update into runs; `first` is the parent's row block that counts as block 0.
+    fn runs(&self, rows: Range<usize>, first: usize) -> Vec<Run> {
+        let mut runs: Vec<Run> = Vec::with_capacity(rows.len() / 3);
+        for row in rows {
+            let (place, start) = (self.in_parent[row] as usize, self.starts[row] as usize / BLOCK);
+            let above = if place < self.columns { 0 } else { self.columns.div_ceil(BLOCK) };
+            let (block, lane) = (above + start / BLOCK - first, start % BLOCK);
+            match runs.last_mut() {
+                Some(run) if run.block == block && run.lane + run.count == lane && row % BLOCK != 0 => run.count += 1,
+                _ => runs.push(Run { row, count: 1, block, lane }),
             }
         }
+        runs
     }
 }
 

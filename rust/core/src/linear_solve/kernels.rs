@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::blocks::BLOCK;
+use super::blocks::{BLOCK, triangle_len};
 
 /// Columns that a product sums up before it stores, and row blocks it keeps at hand meanwhile: half a megabyte.
 const DEPTH: usize = 256;
@@ -85,7 +85,14 @@ impl WithSimd for Eliminate<'_, '_, '_> {
                 let before = pivot_row[BLOCK * BLOCK * first..start].as_chunks().0;
                 match rows {
                     [r0, r1, r2] if S::F64_LANES == BLOCK => {
-                        eliminate_tile::<S, 3>(simd, [r0, r1, r2].map(|row| &mut row[skip..]), 0, before, &pivot, width);
+                        eliminate_tile::<S, 3>(
+                            simd,
+                            [r0, r1, r2].map(|row| &mut row[skip..]),
+                            0,
+                            before,
+                            &pivot,
+                            width,
+                        );
                     }
                     _ => {
                         for row in rows.iter_mut() {
@@ -283,6 +290,59 @@ fn subtract<S: Simd, const C: usize>(
     for c in 0..C {
         if let Some(target) = block.get_mut((first + c) * stride + part) {
             *target = simd.sub_f64s(if overwrite { simd.splat_f64s(0.0) } else { *target }, sum[c]);
+        }
+    }
+}
+
+/// Neighbouring rows of an update that become neighbouring rows of one row block of the parent.
+pub(super) struct Run {
+    /// First row in the update, and the number of rows, all in one row block of either side.
+    pub(super) row: usize,
+    pub(super) count: usize,
+    /// Row block and lane of the first row in the parent.
+    pub(super) block: usize,
+    pub(super) lane: usize,
+}
+
+/// Adds rows of an update to row blocks of the parent. Column `first + j` goes to where `columns[j]` says in a row block.
+/// What lies above the diagonal of a block on the diagonal is never used, so that runs need not heed it.
+pub(super) struct AddRuns<'a, 't> {
+    pub(super) update: &'a [f64],
+    pub(super) runs: &'a [Run],
+    pub(super) first: usize,
+    pub(super) columns: &'a [u32],
+    pub(super) target: &'a mut [&'t mut [f64]],
+}
+
+impl WithSimd for AddRuns<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { update, runs, first, columns, target } = self;
+        for &Run { row, count, block, lane } in runs {
+            let columns = &columns[..columns.len().min((row + count).saturating_sub(first))];
+            let start = triangle_len(row / BLOCK) + row % BLOCK + BLOCK * first;
+            let target = &mut target[block];
+            // The eight numbers around each column's part of the run, of which the others are masked.
+            let around = start.checked_sub(lane).and_then(|start| update.get(start..start + BLOCK * columns.len()));
+            let Some(around) = around else {
+                for (values, &column) in update[start..].chunks(BLOCK).zip(columns) {
+                    let target = &mut target[column as usize + lane..];
+                    target.iter_mut().zip(&values[..count]).for_each(|(target, value)| *target += value);
+                }
+                continue;
+            };
+            let mut kept = [0.0; BLOCK];
+            kept[lane..lane + count].fill(1.0);
+            let kept = S::as_simd_f64s(&kept).0;
+            for (values, &column) in around.as_chunks::<BLOCK>().0.iter().zip(columns) {
+                let target = S::as_mut_simd_f64s(&mut target[column as usize..][..BLOCK]).0;
+                let values = S::as_simd_f64s(values).0;
+                for part in 0..BLOCK / S::F64_LANES {
+                    target[part] = simd.mul_add_e_f64s(values[part], kept[part], target[part]);
+                }
+            }
         }
     }
 }
@@ -536,11 +596,7 @@ fn transposed_product<S: Simd, const V: usize>(
 
 /// Solves `pivots^T * x = x` for the rows x[v][0..8].
 #[inline(always)]
-fn divide_transposed<S: Simd, const V: usize>(
-    simd: S,
-    x: &mut [[S::f64s; BLOCK]; V],
-    pivots: &[f64; BLOCK * BLOCK],
-) {
+fn divide_transposed<S: Simd, const V: usize>(simd: S, x: &mut [[S::f64s; BLOCK]; V], pivots: &[f64; BLOCK * BLOCK]) {
     for c in (0..BLOCK).rev() {
         let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
         for v in 0..V {

@@ -39,6 +39,13 @@ pub(super) struct Multifrontal {
 }
 
 impl Multifrontal {
+    /// Multiplications and additions that factoring `matrix` takes; `None` if it is no surface with these positions.
+    pub(super) fn flops(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Option<f64> {
+        let graph = Graph::new(matrix);
+        let tree = Tree::new(&graph, dissect(&graph, positions)?);
+        Some(tree.fronts[tree.root()].subtree_flops)
+    }
+
     /// Factors `matrix`; `None` if it is no surface with these positions.
     pub(super) fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Option<Self>, NotPositive> {
         let graph = Graph::new(matrix);
@@ -48,33 +55,6 @@ impl Multifrontal {
         let panels = factor(&tree, &graph, arch)?;
         let (trusted, substitute) = (OnceLock::new(), OnceLock::new());
         Ok(Some(Self { tree, panels, arch, matrix: matrix.clone(), trusted, substitute }))
-    }
-
-    pub(super) fn time(matrix: &SymmetricMatrix, positions: &[Vec3], clock: &dyn Fn() -> f64) {
-        let t0 = clock();
-        let graph = Graph::new(matrix);
-        let t1 = clock();
-        let dissection = dissect(&graph, positions).unwrap();
-        let t2 = clock();
-        let tree = Tree::new(&graph, dissection);
-        let t3 = clock();
-        let panels = factor(&tree, &graph, Arch::new()).unwrap();
-        let t4 = clock();
-        let root = &tree.fronts[tree.root()];
-        println!(
-            "graph {:.4} dissect {:.4} tree {:.4} factor {:.4} ({:.1} GF/s) fronts {} panels {:.3}M flops {:.3e} rows {:.3}M updates {:.3}M {}",
-            t1 - t0,
-            t2 - t1,
-            t3 - t2,
-            t4 - t3,
-            root.subtree_flops / (t4 - t3) * 1e-9,
-            tree.fronts.len(),
-            root.subtree_panels as f64 * 1e-6,
-            root.subtree_flops * 1.0,
-            tree.fronts.iter().map(|f| f.rows.len()).sum::<usize>() as f64 * 1e-6,
-            tree.fronts.iter().map(|f| f.update_len()).sum::<usize>() as f64 * 1e-6,
-            panels.len()
-        );
     }
 
     /// Solves in place, `rhs` (n, columns) row-major.
