@@ -67,7 +67,7 @@ fn dominant_axis(covariance: DMat3) -> DVec3 {
     let mut power = covariance;
     for _ in 0..8 {
         let scale = power.x_axis.x + power.y_axis.y + power.z_axis.z;
-        power = power * (1.0 / scale.max(f64::MIN_POSITIVE));
+        power *= 1.0 / scale.max(f64::MIN_POSITIVE);
         power = power * power;
     }
     let columns = [power.x_axis, power.y_axis, power.z_axis];

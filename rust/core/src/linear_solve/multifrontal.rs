@@ -148,13 +148,13 @@ impl Multifrontal {
 mod tests {
     use super::*;
 
-    /// A chain of unknowns, each coupled to its next two.
+    /// A chain of unknowns, each coupled to its next thirty.
     fn chain(n: usize) -> (SymmetricMatrix, Vec<Vec3>) {
         let mut matrix = SymmetricMatrix { column_starts: vec![0], ..Default::default() };
         for j in 0..n {
-            for (offset, value) in [6.1, -4.0, 1.0].into_iter().enumerate().take(n - j) {
+            for offset in 0..31.min(n - j) {
                 matrix.rows.push((j + offset) as u32);
-                matrix.values.push(value);
+                matrix.values.push(if offset == 0 { 60.5 } else { -1.0 });
             }
             matrix.column_starts.push(matrix.rows.len());
         }
@@ -171,6 +171,34 @@ mod tests {
         factor.solve_in_place(&mut x, 70);
         Supernodal::factor(&matrix).unwrap().solve_in_place(&mut wanted, 70);
         x.iter().zip(&wanted).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+    }
+
+    /// Every instruction set this machine has.
+    fn instruction_sets() -> Vec<Arch> {
+        let mut sets = vec![Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+            sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+        }
+        sets
+    }
+
+    #[test]
+    fn solves_on_every_instruction_set() {
+        let (matrix, positions) = chain(1500);
+        let rhs: Vec<f64> = (0..1500 * 29).map(|i| (i as f64).sin()).collect();
+        let mut wanted = rhs.clone();
+        Supernodal::factor(&matrix).unwrap().solve_in_place(&mut wanted, 29);
+        for arch in instruction_sets() {
+            let mut solver = Multifrontal::factor(&matrix, &positions).unwrap().unwrap();
+            solver.arch = arch;
+            solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch).unwrap();
+            let mut x = rhs.clone();
+            solver.solve_in_place(&mut x, 29);
+            let worst = x.iter().zip(&wanted).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+            assert!(worst < 1e-9 && solver.trusted.get() == Some(&true), "{arch:?}: {worst:e}");
+        }
     }
 
     #[test]

@@ -22,10 +22,10 @@ pub(super) struct Patch {
 impl Patch {
     /// Takes the couplings of `points`, of which the neighbours are given as indices into `points`. The points' numbers
     /// become those indices.
-    pub(super) fn new<N: Iterator<Item = usize>>(points: &[Point], neighbours: impl Fn(u32) -> N) -> Self {
+    pub(super) fn new<N: Iterator<Item = u32>>(points: &[Point], neighbours: impl Fn(u32) -> N) -> Self {
         let set = |point: &Point| {
             let mut set = Set::default();
-            neighbours(point.unknown).for_each(|j| insert(&mut set, j));
+            neighbours(point.unknown).for_each(|local| insert(&mut set, local as usize));
             set
         };
         Self { neighbours: points.iter().map(set).collect(), place: vec![0; points.len()], ordered: 0 }
