@@ -70,8 +70,8 @@ check: .venv/tests.stamp cargo
 	.venv/bin/mypy
 	$(MAKE) test
 
-## make bench      against the peers, in bench/results.md and bench/results.png (SIZES=5k,20k,100k,300k,1M)
-SIZES := 5k,20k,100k
+## make bench      against the peers, in bench/results.md and .png; 20 minutes, or some sizes: make bench SIZES=5k,20k
+SIZES := 5k,20k,100k,300k,1M
 bench: .venv/bench.stamp
 	.venv/bin/python bench/run.py --sizes $(SIZES)
 

@@ -48,6 +48,7 @@ METHODS = [
     "superlu",
     "skinwright closest points",
     "libigl closest points",
+    "blender add-on",
     "blender data transfer",
 ]
 LARGEST = {"superlu": "100k"}  # beyond, it takes minutes and gigabytes without telling more

@@ -83,6 +83,9 @@ class MaskPainting:
             self._stop()
             self.problem = str(error)
             return False
+        except BaseException:
+            self._stop()
+            raise
         result = self._runner.result
         self._stop()
         self.session.write(target, result)

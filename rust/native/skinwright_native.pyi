@@ -271,7 +271,8 @@ class SculptSolver:
     ) -> tuple[NDArray[np.float32], Weights]:
         """Offsets (n, 3) to the rest positions of `vertices` (n,) and weights, one row each, that together meet what
         was sculpted: sum_p alpha_p |T_p(w)(v + delta) - t_p|^2 + stiffness |delta|^2, by alternation. Nothing is
-        changed. A vertex sculpted in fewer than two poses gets no offset; a stroke to `posed` targets holds a pose."""
+        changed. A vertex sculpted in fewer than two poses gets no offset; to hold a pose, make it a stroke with `posed`
+        targets."""
 
 def simplex_qp(h: ArrayLike, g: ArrayLike, start: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
     """Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for P problems of N <= 12 unknowns at once: the

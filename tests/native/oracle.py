@@ -51,31 +51,35 @@ def normalised(weights: sp.csr_matrix) -> sp.csr_matrix:
 
 def match(source: tuple, target: tuple) -> Matching:
     """Closest points of `target` (positions, triangles) on `source` (positions, triangles, weights)."""
-    (positions, triangles, weights), (points, target_triangles) = source, target
+    points, triangles = target
     squared, _, share = closest_rows(source, points)
-    source_normals = vertex_normals(positions, triangles)
-    source_normals /= np.maximum(np.linalg.norm(source_normals, axis=1, keepdims=True), 1e-300)
-    blended, own = share @ source_normals, vertex_normals(points, target_triangles)
-    angle = np.arctan2(np.linalg.norm(np.cross(own, blended), axis=1), (own * blended).sum(axis=1))
-    missing = (np.linalg.norm(own, axis=1) == 0) | (np.linalg.norm(blended, axis=1) == 0)
-    rows = normalised(share @ normalised(weights))
-    return Matching(np.sqrt(squared), np.where(missing, np.nan, angle), rows)
+    return _at_points(source, np.sqrt(squared), share, vertex_normals(points, triangles))
 
 
-def tied_rows(source: tuple, point: np.ndarray) -> np.ndarray:
-    """The row of every source triangle that is as near to `point` as the nearest one, within 1e-12 of the squared
-    diagonal (spec-transfer, section 1: a tie may take any of them).
-    """
-    positions, triangles, weights = source
+def ties(source: tuple, point: np.ndarray, normal: np.ndarray) -> Matching:
+    """What every source triangle gives that is as near to `point` as the nearest one, within 1e-12 of the squared
+    diagonal (spec-transfer, section 1: a tie may take any of them)."""
+    positions, left, weights = source
     tolerance = 1e-12 * (np.ptp(positions, axis=0) ** 2).sum()
-    rows, nearest, left = [], np.inf, triangles
+    shares, distances = [], []
     while True:
         squared, faces, share = closest_rows((positions, left, weights), point[None])
-        if squared[0] > nearest + tolerance:
-            return np.vstack(rows)
-        nearest = min(nearest, squared[0])
-        rows.append(normalised(share @ normalised(weights)).toarray())
+        if distances and squared[0] > distances[0] ** 2 + tolerance:
+            normals = np.repeat(normal[None], len(shares), axis=0)
+            return _at_points(source, np.array(distances), sp.vstack(shares).tocsr(), normals)
+        shares.append(share)
+        distances.append(np.sqrt(squared[0]))
         left = np.delete(left, faces[0], axis=0)
+
+
+def _at_points(source: tuple, distance: np.ndarray, share: sp.csr_matrix, normals: np.ndarray) -> Matching:
+    positions, triangles, weights = source
+    source_normals = vertex_normals(positions, triangles)
+    source_normals /= np.maximum(np.linalg.norm(source_normals, axis=1, keepdims=True), 1e-300)
+    blended = share @ source_normals
+    angle = np.arctan2(np.linalg.norm(np.cross(normals, blended), axis=1), (normals * blended).sum(axis=1))
+    missing = (np.linalg.norm(normals, axis=1) == 0) | (np.linalg.norm(blended, axis=1) == 0)
+    return Matching(distance, np.where(missing, np.nan, angle), normalised(share @ normalised(weights)))
 
 
 def islands(triangles: np.ndarray, count: int) -> np.ndarray:

@@ -48,6 +48,10 @@ class LongWork(Operator):
             self._end(context)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        except BaseException:
+            # Else the timer would come back to it for ever.
+            self._end(context)
+            raise
         _show(context)
         if not runner.done:
             return {"RUNNING_MODAL"}

@@ -112,6 +112,18 @@ fn tube(name: &'static str, around: usize, along: usize) -> Case {
     (name, squared_laplacian(around * along, &grid_edges(around, along, true), 100.0), positions)
 }
 
+/// A skirt without a fold: from every side as many vertices lie on the cutting plane as the rounding lets.
+fn cone(name: &'static str, around: usize, along: usize) -> Case {
+    let position = |i: usize| {
+        let angle = (i % around) as f64 / around as f64 * std::f64::consts::TAU;
+        let height = 1.8 - 1.55 * (i / around) as f64 / around as f64;
+        let radius = 0.32 + 0.9 * (1.1 - height).max(0.0);
+        Vec3::new((radius * angle.cos()) as f32, (radius * angle.sin()) as f32, height as f32)
+    };
+    let positions = (0..around * along).map(position).collect();
+    (name, squared_laplacian(around * along, &grid_edges(around, along, true), 100.0), positions)
+}
+
 /// A graph that has nothing to do with the positions of its vertices.
 fn random_graph(name: &'static str, n: usize, edges: usize) -> Case {
     let mut noise = Noise(7);
@@ -162,6 +174,9 @@ fn cases() -> Vec<Case> {
         grid("large grid", 130, 110),
         grid("strip", 2000, 3),
         tube("tube", 180, 50),
+        cone("cone", 141, 60),
+        cone("long cone", 141, 100),
+        cone("wide cone", 387, 60),
         side_by_side("islands", &[grid("", 30, 20), grid("", 1, 1), grid("", 9, 9), tube("", 50, 20), grid("", 2, 1)]),
         side_by_side("large islands", &[grid("", 70, 70), tube("", 90, 60)]),
         arrow(400),

@@ -306,12 +306,24 @@ fn a_million_identical_triangles() {
 }
 
 #[test]
-fn no_queries_and_queries_that_are_not_finite() {
-    let mesh = sheet(10);
-    let positions = AS_IT_IS.place(&mesh.points);
-    let index = SurfaceIndex::new(&TriMesh::new(&positions, &mesh.triangles, "sheet").unwrap());
-    assert!(index.closest_points(&[]).is_empty());
-    let found = index.closest_points(&[[f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0], [3.0, 3.0, 0.0]]);
-    assert!(!found[0].distance.is_finite() && !found[1].distance.is_finite());
-    assert_eq!(found[2], index.closest_point([3.0, 3.0, 0.0]));
+fn no_queries_and_queries_beyond_all_bounds() {
+    let one = soup("one triangle", vec![[0, 0, 0], [9, 1, 0], [2, 7, 3]]);
+    for mesh in [one, sheet(10)] {
+        let positions = AS_IT_IS.place(&mesh.points);
+        let index = SurfaceIndex::new(&TriMesh::new(&positions, &mesh.triangles, mesh.name).unwrap());
+        assert!(index.closest_points(&[]).is_empty());
+        let odd = [[f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0], [f32::MAX; 3], [3.0, 3.0, 0.0]];
+        let found = index.closest_points(&odd);
+        assert!(!found[0].distance.is_finite() && !found[1].distance.is_finite());
+        assert!((found[2].distance / f64::from(f32::MAX) - 3.0_f64.sqrt()).abs() < 1e-9);
+        assert_eq!(found[3], index.closest_point(odd[3]));
+    }
+}
+
+#[test]
+fn meshes_as_large_as_numbers_go() {
+    let positions = [[-f32::MAX, 0.0, 0.0], [f32::MAX, 0.0, 0.0], [0.0, f32::MAX, f32::MAX]];
+    let mesh = TriMesh::new(&positions, &[[0, 1, 2]], "source").unwrap();
+    let answer = SurfaceIndex::new(&mesh).closest_point([0.0; 3]);
+    assert!(answer.distance < 1e-9 * f64::from(f32::MAX), "{answer:?}");
 }

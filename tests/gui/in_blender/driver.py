@@ -96,6 +96,10 @@ class Window:
         for area in self.window.screen.areas:
             area.tag_redraw()
         yield 0.4
+        self.shoot(name)
+
+    def shoot(self, name: str) -> None:
+        """What is on the screen now."""
         # Blender's own screenshot operator reads black from a window on a virtual screen.
         if shutil.which("import"):
             subprocess.run(["import", "-window", "root", str(SHARE / "out" / f"{name}.png")], check=True)

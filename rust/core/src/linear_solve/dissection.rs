@@ -123,13 +123,13 @@ impl Cutter<'_> {
 
     /// Moves the points into the order (below, above, separator) and returns the first two's sizes.
     fn cut(&self, points: &mut [Point]) -> (usize, usize) {
-        let axes = principal_axes(points);
+        let (axes, origin) = (principal_axes(points), points[0].position);
         let tried = if points.len() > TRY_AXES { axes.len() } else { 1 };
-        let plane = halve(points, axes[0]);
+        let plane = halve(points, axes[0], origin);
         let mut best = self.separator(points, plane);
         let (mut chosen, mut last) = (0, 0);
         for axis in 1..tried {
-            let plane = halve(points, axes[axis]);
+            let plane = halve(points, axes[axis], origin);
             let separator = self.separator(points, plane);
             last = axis;
             if separator.len() < best.len() {
@@ -137,7 +137,7 @@ impl Cutter<'_> {
             }
         }
         if chosen != last {
-            halve(points, axes[chosen]);
+            halve(points, axes[chosen], origin);
         }
         for &unknown in &best {
             self.removed[unknown as usize].store(true, Ordering::Relaxed);

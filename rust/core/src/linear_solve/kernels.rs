@@ -129,17 +129,17 @@ fn eliminate_tile<S: Simd, const V: usize>(
     let sum = product::<S, V, BLOCK>(simd, done, stride, before, 0);
     let mut x = [[simd.splat_f64s(0.0); BLOCK]; V];
     for v in 0..V {
-        for c in 0..width {
-            x[v][c] = now[v][c * stride];
-        }
         for c in 0..BLOCK {
-            x[v][c] = simd.sub_f64s(x[v][c], sum[v][c]);
+            let old = if c < width { now[v][c * stride] } else { simd.splat_f64s(0.0) };
+            x[v][c] = simd.sub_f64s(old, sum[v][c]);
         }
     }
     divide(simd, &mut x, pivots);
     for v in 0..V {
-        for c in 0..width {
-            now[v][c * stride] = x[v][c];
+        for c in 0..BLOCK {
+            if c < width {
+                now[v][c * stride] = x[v][c];
+            }
         }
     }
 }
@@ -342,19 +342,39 @@ fn forward_tile<S: Simd, const V: usize>(
 ) {
     let a: [&[S::f64s]; V] = std::array::from_fn(|v| &done[(at + v).min(done.len())..]);
     let sum = product::<S, V, BLOCK>(simd, a, stride, before, 0);
+    let mut x = subtract_from::<S, V>(simd, now, stride, at, &sum);
+    divide(simd, &mut x, pivots);
+    store::<S, V>(now, stride, at, &x);
+}
+
+/// Up to eight rows of `target` minus `sum`; rows that are not there count as zero. (Indices are constants everywhere, or
+/// the sums would live in memory instead of registers.)
+#[inline(always)]
+fn subtract_from<S: Simd, const V: usize>(
+    simd: S,
+    target: &[S::f64s],
+    stride: usize,
+    at: usize,
+    sum: &[[S::f64s; BLOCK]; V],
+) -> [[S::f64s; BLOCK]; V] {
     let mut x = [[simd.splat_f64s(0.0); BLOCK]; V];
-    for v in 0..V {
-        for (c, row) in now.chunks_exact(stride).enumerate() {
-            x[v][c] = row[at + v];
-        }
-        for c in 0..BLOCK {
-            x[v][c] = simd.sub_f64s(x[v][c], sum[v][c]);
+    for c in 0..BLOCK {
+        for v in 0..V {
+            let old = target.get(c * stride + at + v).copied().unwrap_or(simd.splat_f64s(0.0));
+            x[v][c] = simd.sub_f64s(old, sum[v][c]);
         }
     }
-    divide(simd, &mut x, pivots);
-    for v in 0..V {
-        for (c, row) in now.chunks_exact_mut(stride).enumerate() {
-            row[at + v] = x[v][c];
+    x
+}
+
+/// Puts `x` into the rows of `target` that are there.
+#[inline(always)]
+fn store<S: Simd, const V: usize>(target: &mut [S::f64s], stride: usize, at: usize, x: &[[S::f64s; BLOCK]; V]) {
+    for c in 0..BLOCK {
+        for v in 0..V {
+            if let Some(target) = target.get_mut(c * stride + at + v) {
+                *target = x[v][c];
+            }
         }
     }
 }
@@ -477,7 +497,25 @@ fn backward_tile<S: Simd, const V: usize>(
     at: usize,
     pivots: Option<&[f64; BLOCK * BLOCK]>,
 ) {
-    let columns = y.len() / stride;
+    let sum = transposed_product::<S, V>(simd, rows, x, block, y.len() / stride, stride, at);
+    let mut sum = subtract_from::<S, V>(simd, y, stride, at, &sum);
+    if let Some(pivots) = pivots {
+        divide_transposed(simd, &mut sum, pivots);
+    }
+    store::<S, V>(y, stride, at, &sum);
+}
+
+/// Sums over i of `rows[i][block column c] * x[i][at + v]`, for the first `columns` columns of the block.
+#[inline(always)]
+fn transposed_product<S: Simd, const V: usize>(
+    simd: S,
+    rows: RowBlocks,
+    x: &[S::f64s],
+    block: usize,
+    columns: usize,
+    stride: usize,
+    at: usize,
+) -> [[S::f64s; BLOCK]; V] {
     let start = BLOCK * BLOCK * block;
     let mut sum = [[simd.splat_f64s(0.0); BLOCK]; V];
     for (row, x) in rows.iter().zip(x.chunks(BLOCK * stride)) {
@@ -490,38 +528,36 @@ fn backward_tile<S: Simd, const V: usize>(
                 &padded
             }
         };
-        for (r, x) in x.chunks_exact(stride).enumerate().take(BLOCK) {
+        for (r, x) in x.chunks_exact(stride).enumerate() {
             let x: [S::f64s; V] = std::array::from_fn(|v| x[at + v]);
             for c in 0..BLOCK {
-                let factor = simd.splat_f64s(entries[BLOCK * c + (r & 7)]);
+                let factor = simd.splat_f64s(entries[BLOCK * c + (r % BLOCK)]);
                 for v in 0..V {
                     sum[v][c] = simd.mul_add_e_f64s(x[v], factor, sum[v][c]);
                 }
             }
         }
     }
-    for (c, row) in y.chunks_exact(stride).enumerate().take(BLOCK) {
+    sum
+}
+
+/// Solves `pivots^T * x = x` for the rows x[v][0..8].
+#[inline(always)]
+fn divide_transposed<S: Simd, const V: usize>(
+    simd: S,
+    x: &mut [[S::f64s; BLOCK]; V],
+    pivots: &[f64; BLOCK * BLOCK],
+) {
+    for c in (0..BLOCK).rev() {
+        let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
         for v in 0..V {
-            sum[v][c] = simd.sub_f64s(row[at + v], sum[v][c]);
+            x[v][c] = simd.mul_f64s(x[v][c], inverse);
         }
-    }
-    if let Some(pivots) = pivots {
-        for c in (0..BLOCK).rev() {
-            let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
+        for earlier in 0..c {
+            let factor = simd.splat_f64s(-pivots[BLOCK * earlier + c]);
             for v in 0..V {
-                sum[v][c] = simd.mul_f64s(sum[v][c], inverse);
+                x[v][earlier] = simd.mul_add_e_f64s(x[v][c], factor, x[v][earlier]);
             }
-            for earlier in 0..c {
-                let factor = simd.splat_f64s(-pivots[BLOCK * earlier + c]);
-                for v in 0..V {
-                    sum[v][earlier] = simd.mul_add_e_f64s(sum[v][c], factor, sum[v][earlier]);
-                }
-            }
-        }
-    }
-    for (c, row) in y.chunks_exact_mut(stride).enumerate().take(BLOCK) {
-        for v in 0..V {
-            row[at + v] = sum[v][c];
         }
     }
 }

@@ -359,7 +359,8 @@ impl BackwardPass<'_> {
                 || self.subtract_later(rows, x, block + blocks / 2, right),
             );
         } else {
-            for (rows, x) in rows.chunks(STREAMS).zip(x.chunks(STREAMS * BLOCK * self.width)) {
+            let streams = rows.len().div_ceil(rows.len().div_ceil(STREAMS));
+            for (rows, x) in rows.chunks(streams).zip(x.chunks(streams * BLOCK * self.width)) {
                 for (offset, y) in y.chunks_mut(BLOCK * self.width).enumerate() {
                     let block = block + offset;
                     self.arch.dispatch(Backward { rows, x, block, y, width: self.width, pivots: None });

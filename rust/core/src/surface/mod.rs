@@ -3,6 +3,7 @@
 mod bvh;
 mod closest_point;
 mod morton;
+mod node;
 mod search;
 
 use glam::Vec3;

@@ -4,8 +4,9 @@ use glam::{DVec3, Vec3};
 use pulp::{Simd, WithSimd};
 
 use super::SurfacePoint;
-use super::bvh::{Bvh, LEAF, WIDTH};
+use super::bvh::Bvh;
 use super::closest_point::closest_to_origin;
+use super::node::{LEAF, WIDTH};
 
 /// Squared distances to boxes are f32; this much more than the best so far is still looked into.
 const BOX_SLACK: f64 = 1e-5;
@@ -59,7 +60,7 @@ impl Nearest {
         for (lane, squared) in squared.iter_mut().enumerate() {
             *squared = closest_to_origin(stored.corners_from(query, lane)).1;
         }
-        for lane in lanes(squared.map(|s| s <= self.squared)) {
+        for lane in lanes(mask(squared.map(|s| s <= self.squared))) {
             let triangle = stored.triangles[lane];
             if squared[lane] < self.squared || (squared[lane] == self.squared && triangle < self.triangle) {
                 *self = Self { squared: squared[lane], triangle, leaf, lane };
@@ -97,20 +98,21 @@ fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) 
         let squared = node.squared_distances(query);
         let limit = best.limit();
         let bottom = stack.len();
-        for lane in lanes(squared.map(|s| s <= limit)) {
+        for lane in lanes(node.used & mask(squared.map(|s| s <= limit))) {
             insert_descending(stack, bottom, (squared[lane], node.children[lane]));
         }
     }
     best
 }
 
+#[inline(always)]
+fn mask(lanes: [bool; WIDTH]) -> u32 {
+    lanes.iter().enumerate().fold(0, |mask, (lane, &is_set)| mask | u32::from(is_set) << lane)
+}
+
 /// The lanes that are set, in order.
 #[inline(always)]
-fn lanes(set: [bool; WIDTH]) -> impl Iterator<Item = usize> {
-    let mut mask = 0_u32;
-    for (lane, &is_set) in set.iter().enumerate() {
-        mask |= u32::from(is_set) << lane;
-    }
+fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = mask.trailing_zeros() as usize;
         mask &= mask.wrapping_sub(1);

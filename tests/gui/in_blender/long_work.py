@@ -1,0 +1,67 @@
+"""A long transfer shows its progress, Esc stops it with nothing written, left alone it ends; then the redo panel."""
+
+import sys
+from importlib import import_module
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import bpy
+import dress
+from driver import EXTENSION, Steps, Window, enable, record, start, until
+from painting import look
+
+
+def steps(window: Window) -> Steps:
+    yield 0.5
+    enable()
+    jobs = import_module(f"{EXTENSION}.jobs")
+    _, figure, garment = dress.build(100_000, 60)
+    bpy.context.scene.skinwright.transfer.source = figure
+    with window.context():
+        bpy.ops.ed.undo_push(message="Scene")
+    yield from window.show_tab("Weights")
+    look(window)
+    yield 0.5
+    window.event("MOUSEMOVE")
+    yield 0.3
+
+    with window.context():
+        assert bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    runner = jobs.running
+    window.key("ESC")
+    yield from until(lambda: jobs.running is None)
+    assert runner.result is None and not garment.vertex_groups, "Esc came too late or something was written"
+
+    with window.context():
+        bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT", True)
+    seen = []
+    shot = False
+    while jobs.running is not None:
+        seen.append(jobs.running.progress)
+        if not shot and seen[-1] > 0.02:
+            window.shoot("progress")
+            shot = True
+        yield 0.02
+    assert seen == sorted(seen) and seen[-1] > 0
+    assert len(garment.vertex_groups) > 10
+    record["progress"] = seen
+
+    _, figure, garment = dress.build(2500)
+    bpy.context.scene.skinwright.transfer.source = figure
+    bpy.context.scene.skinwright.overlay.kind = "INFLUENCES"
+    look(window)
+    yield 0.3
+    with window.context():
+        assert bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT", True) == {"FINISHED"}
+    yield 0.5
+    window.key("F9")
+    yield from window.screenshot("redo_panel")
+    window.key("ESC")
+    yield 0.2
+    with window.context():
+        bpy.ops.skinwright.check_weights("INVOKE_DEFAULT", True)
+    record["selected"] = sum(vertex.select for vertex in garment.data.vertices)
+
+
+start(steps)
