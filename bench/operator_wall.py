@@ -9,11 +9,14 @@
 import os
 import statistics
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+# Before bpy is imported: the user's own preferences stay out of it.
+os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="skinwright-bench-")
 
 import bpy
 import extension
@@ -74,13 +77,15 @@ def measure(size: str) -> str:
 
     weights = skinwright_native.Weights(rows.indptr, rows.bones, rows.values, len(bones))
     arrays = source["positions"], source["triangles"], weights, target["positions"], target["triangles"]
+    # The panel's own numbers: Blender keeps them as f32, and 0.05 is another number there.
+    settings = bpy.context.scene.skinwright.transfer.to_params().native()
     walls, calls = [], []
     for _ in range(ROUNDS):
         garment.vertex_groups.clear()
         garment.modifiers.clear()
         walls.append(seconds(bpy.ops.skinwright.transfer_weights))
-        calls.append(seconds(lambda: skinwright_native.transfer_weights(*arrays)))
-        answer = skinwright_native.transfer_weights(*arrays).weights
+        calls.append(seconds(lambda: skinwright_native.transfer_weights(*arrays, **settings)))
+        answer = skinwright_native.transfer_weights(*arrays, **settings).weights
         written = vertex_groups.read(garment, bones)
         assert np.array_equal(written.indptr, answer.indptr) and np.array_equal(written.bones, answer.bones)
         assert np.array_equal(written.values, answer.values)

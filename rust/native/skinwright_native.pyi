@@ -84,6 +84,9 @@ class Source:
     """A body prepared once (checks, BVH, normals) for any number of garments. `threads` 0: all of the machine's."""
 
     def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights, *, threads: int = 0) -> Source: ...
+    def closest_points(
+        self, positions: ArrayLike, *, threads: int = 0
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]: ...
     def transfer(
         self,
         target_positions: ArrayLike,

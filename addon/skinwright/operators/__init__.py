@@ -8,10 +8,12 @@ from . import (
     presets,
     preview_match,
     sculpt_weights,
+    timers,
     transfer_weights,
 )
 
 MODULES = (
+    timers,
     transfer_weights,
     presets,
     preview_match,

@@ -6,6 +6,7 @@ from bpy.types import Context, Event, Operator
 
 from .. import jobs, native
 from ..scene.error import SceneError
+from . import timers
 
 TICK_SECONDS = 0.05
 
@@ -27,9 +28,8 @@ class LongWork(Operator):
         if runner.done:
             return self.complete(context, runner.result)
         self._runner = jobs.running = runner
-        window_manager = context.window_manager
-        self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
-        window_manager.modal_handler_add(self)
+        self._timer = timers.start(context, TICK_SECONDS)
+        context.window_manager.modal_handler_add(self)
         _show(context)
         return {"RUNNING_MODAL"}
 
@@ -65,7 +65,7 @@ class LongWork(Operator):
 
     def _end(self, context: Context) -> None:
         jobs.running = None
-        context.window_manager.event_timer_remove(self._timer)
+        timers.stop(self._timer)
         _show(context)
 
 

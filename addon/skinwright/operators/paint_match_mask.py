@@ -8,6 +8,7 @@ from .. import match_session, native, preferences
 from ..mask_painting import MaskPainting
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
+from . import timers
 from .preview_match import refusal, target
 
 TICK_SECONDS = 0.02
@@ -44,9 +45,8 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
         match_session.current = painting.session
         # Else undoing the first stroke would also undo that painting has begun.
         bpy.ops.ed.undo_push(message=self.bl_label)
-        window_manager = context.window_manager
-        self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
-        window_manager.modal_handler_add(self)
+        self._timer = timers.start(context, TICK_SECONDS)
+        context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set("Paint the match mask   Enter: keep   Esc: weights as they were")
         return {"RUNNING_MODAL"}
 
@@ -83,7 +83,7 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits: then there is nothing to restore."""
         SKINWRIGHT_OT_paint_match_mask.painting = None
-        context.window_manager.event_timer_remove(self._timer)
+        timers.stop(self._timer)
         if context.workspace:
             context.workspace.status_text_set(None)
 
@@ -130,6 +130,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Unregister them."""
+    """Unregister them; painting that goes on is ended by Blender and keeps what it has."""
+    SKINWRIGHT_OT_paint_match_mask.painting = None
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -77,16 +77,12 @@ fn problem<const N: usize>(family: Family, random: &mut Random) -> (SimplexQp<N>
             _ => {}
         }
         let e = d.map(|d| (d - target) / scale);
-        for i in 0..N {
-            for j in 0..N {
-                qp.h[i][j] += e[i].dot(e[j]);
-            }
+        for (row, e_i) in qp.h.iter_mut().zip(e) {
+            row.iter_mut().zip(e).for_each(|(entry, e_j)| *entry += e_i.dot(e_j));
         }
     }
-    for j in 0..N {
-        qp.h[j][j] += PULL;
-        qp.g[j] = PULL * start[j];
-    }
+    (0..N).for_each(|j| qp.h[j][j] += PULL);
+    qp.g = start.map(|o| PULL * o);
     (qp, start)
 }
 
@@ -284,12 +280,12 @@ proptest! {
         let poses = [0, 1].map(|p| solver.add_pose(character.poses[p].clone(), 1.0).unwrap());
         let mut states = vec![solver.weights()];
         let mut strokes = Vec::new();
-        for s in 0..4usize {
+        for (s, pose) in [poses[0], poses[1], poses[0], poses[1]].into_iter().enumerate() {
             let vertices: Vec<u32> = (0..30).filter(|i| (i + s as u32) % 3 > 0).collect();
             let targets: Vec<[f32; 3]> = vertices.iter().map(|_| random.point().as_vec3().to_array()).collect();
-            solver.stroke(poses[s % 2], &vertices, &targets).unwrap();
+            solver.stroke(pose, &vertices, &targets).unwrap();
             states.push(solver.weights());
-            strokes.push((poses[s % 2], vertices, targets));
+            strokes.push((pose, vertices, targets));
         }
         for s in (0..4).rev() {
             prop_assert_eq!(solver.undo(), Some(strokes[s].1.as_slice()));

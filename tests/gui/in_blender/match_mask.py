@@ -53,6 +53,12 @@ def steps(window: Window) -> Steps:
     record["few"], record["many"] = few, many
     bpy.context.scene.skinwright.transfer.relative_max_distance = 0.05
 
+    with window.context():
+        bpy.ops.skinwright.paint_match_mask("INVOKE_DEFAULT")
+    window.key("ESC")
+    yield from until(lambda: painting() is None)
+    assert weights() == bare, "Esc before the first stroke did not bring the weights back"
+
     yield from begin_painting(window)
     yield from window.screenshot("paint_begin")
     automatic = weights()

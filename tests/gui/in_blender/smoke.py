@@ -6,7 +6,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import bpy
-from driver import Steps, Window, disable, enable, record, start
+import dress
+from driver import EXTENSION, Steps, Window, disable, enable, record, start
 
 
 def left_behind() -> dict[str, list[str]]:
@@ -15,6 +16,14 @@ def left_behind() -> dict[str, list[str]]:
     return {
         "handlers": [f"{kind}: {h.__module__}" for kind in kinds for h in getattr(handlers, kind)],
         "types": [name for name in dir(bpy.types) if "skinwright" in name.lower()],
+        "timers and drawings": [
+            module
+            for module, running in (
+                (f"{EXTENSION}.operators.timers", "_running"),
+                (f"{EXTENSION}.ui.overlay", "_handles"),
+            )
+            if getattr(sys.modules.get(module), running, None)
+        ],
         "properties": [name for name in dir(bpy.types.Scene) if "skinwright" in name.lower()],
     }
 
@@ -28,6 +37,17 @@ def steps(window: Window) -> Steps:
         disable()
         assert left_behind() == before, (left_behind(), before)
     enable()
+    yield from window.show_tab("Weights")
+    _, figure, _ = dress.build()
+    bpy.context.scene.skinwright.transfer.source = figure
+    with window.context():
+        bpy.ops.skinwright.paint_match_mask("INVOKE_DEFAULT")
+    yield 0.3
+    disable()
+    yield 0.3
+    assert left_behind() == before, "disabling while the mask is painted leaves something behind"
+    enable()
+    bpy.ops.object.mode_set(mode="OBJECT")
     yield from window.show_tab("Weights")
     yield from window.screenshot("panel")
     record["tab"] = window.region("UI").active_panel_category
