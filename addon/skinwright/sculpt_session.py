@@ -6,7 +6,7 @@ name each time, as Blender's undo replaces it.
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import bpy
@@ -105,7 +105,7 @@ class SculptSession:
         """Says how far the next strokes may change weights."""
         if kappa != self.options.kappa:
             self._solver.set_options(kappa, self.options.passes)
-            self.options = SculptOptions(**vars(self.options) | {"kappa": kappa})
+            self.options = replace(self.options, kappa=kappa)
 
     def stroke(self) -> Outcome | None:
         """Turn what a brush has moved since the last time into weights; None if nothing has moved.

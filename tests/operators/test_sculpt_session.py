@@ -218,12 +218,15 @@ def test_guard_poses_hold_better(sculpt, body, rig):
     assert bpy.context.scene.frame_current == 1
 
 
-def test_the_leftover_goes_to_a_driven_shape_key(sculpt, body, rig):
+@pytest.mark.parametrize("mode", ["OBJECT", "SCULPT"])
+def test_the_leftover_goes_to_a_driven_shape_key(sculpt, body, rig, mode):
+    bpy.ops.object.mode_set(mode=mode)
     session = sculpt.SculptSession(body, sculpt.SculptOptions(residual="SHAPE_KEY"))
     brush(body, range(60, 84), (0, 0, 0.4))
     wanted = posed(body)
     assert session.stroke().reachability < 0.9
     report = session.commit()
+    bpy.ops.object.mode_set(mode="OBJECT")
     assert report.shape_keys == ["Corrective Knee"] and not report.warnings
     bpy.context.view_layer.update()
     key = body.data.shape_keys.key_blocks["Corrective Knee"]

@@ -2,10 +2,6 @@
 
 A modal operator never sees the release that ends a stroke: the brush takes it. So it looks, on a timer, whether
 something has changed while no other operator holds the input, and the session looks which vertices have moved.
-
-Undo: each stroke leaves one of Blender's steps, which holds positions only. While the session runs, Ctrl Z is its own.
-At the end those steps are taken back before the result is written, so that it is one step; where the artist has left
-Sculpt mode to change the pose, that would take the pose back too, and they stay.
 """
 
 import bpy
@@ -16,11 +12,11 @@ from .. import native, preferences, sculpt_session
 from ..scene import changes, mesh, sculpting
 from ..scene.error import SceneError
 from ..sculpt_session import SculptSession
+from . import sculpt_undo
 
 TICK_SECONDS = 0.02
 # While posing between strokes, Object and Pose mode belong to the session too.
 MODES = {"SCULPT", "OBJECT", "POSE"}
-MOST_STEPS = 1000
 
 
 class SKINWRIGHT_OT_sculpt_weights(Operator):
@@ -48,7 +44,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             sculpting.check(obj)
             if obj.mode != "SCULPT":
                 bpy.ops.object.mode_set(mode="SCULPT")
-            _mark(obj)
+            sculpt_undo.mark(obj)
             self._session = sculpt_session.current = SculptSession(obj, _options(context))
         except (SceneError, native.NativeError) as error:
             if obj.mode != self._mode:
@@ -117,7 +113,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
         if context.mode == "SCULPT":
             self._look(context)  # a stroke may have ended just now
             if self._steps_to_undo and not self._left:
-                _take_back_steps(context, session.target_name)
+                sculpt_undo.take_back(context, session.target_name)
         self.cancel(context)
         with mesh.object_mode(context):
             obj = session.target()
@@ -173,23 +169,6 @@ def _asked_by(event: Event, context: Context, obj: Object) -> str:
     if event.type == "Z" and (event.ctrl or event.oskey):
         return "REDO" if event.shift else "UNDO"
     return {"RET": "KEEP", "NUMPAD_ENTER": "KEEP", "ESC": "CANCEL"}.get(event.type, "")
-
-
-def _mark(obj: Object) -> None:
-    """Leave an undo step of the time before, by which the way back to it can be found."""
-    obj.skinwright.sculpting = False
-    bpy.ops.ed.undo_push(message="Before Sculpting Weights")
-    obj.skinwright.sculpting = True
-    obj.update_tag()
-
-
-def _take_back_steps(context: Context, name: str) -> None:
-    """Undo the brushes' own steps; the session then writes its state over that of the beginning."""
-    for _ in range(MOST_STEPS):
-        obj = bpy.data.objects.get(name)
-        if obj is None or not obj.skinwright.sculpting or context.mode != "SCULPT" or not bpy.ops.ed.undo.poll():
-            return
-        bpy.ops.ed.undo()
 
 
 def _options(context: Context) -> sculpt_session.SculptOptions:

@@ -41,12 +41,12 @@ def steps(window: Window) -> Steps:
     yield 0.5
     enable()
     watch()
-    for vertices, size in ((int(argument), 52) for argument in sys.argv[sys.argv.index("--") + 1 :]):
+    for vertices in map(int, sys.argv[sys.argv.index("--") + 1 :]):
         obj = character(window, vertices, BONES)
         window.area.spaces.active.overlay.show_overlays = False
         yield 0.5
         started = time.perf_counter()
-        yield from begin(window, size=size)
+        yield from begin(window, size=51 if bpy.app.version >= (5, 0, 0) else 23)  # a diameter since 5.0
         figures = {"begin": [time.perf_counter() - started - 0.8]}
         for number in range(STROKES):
             seen = len(outcomes)
@@ -55,8 +55,9 @@ def steps(window: Window) -> Steps:
             began, ended, outcome = outcomes[-1]
             yield from until(lambda ended=ended: drawn[-1] > ended, 20)
             parts = {"noticed": began - released, **outcome.seconds, "taken": ended - began}
-            parts["evaluate"] = sum(stop - go for go, stop in evaluated if go > ended and stop < drawn[-1])
-            parts["updated"] = next((stop for go, stop in evaluated if go > ended), ended) - released
+            yield from until(lambda ended=ended: evaluated[-1][0] > ended)
+            go, stop = next(times for times in evaluated if times[0] > ended)
+            parts["evaluate"], parts["updated"] = stop - go, stop - released
             parts["drawn"] = next(at for at in drawn if at > ended) - released
             parts["vertices"] = outcome.vertices
             for name, value in parts.items():
