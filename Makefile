@@ -57,7 +57,7 @@ test-rust: cargo
 	cargo test --quiet
 
 test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
-	cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
+	mkdir -p out && cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
 		--allowlist ../rust/native/stubtest_allowlist.txt
 	$(foreach venv,$(OTHER_VENVS),$(call PYTEST,$(venv)) &&) $(call PYTEST,.venv)
 

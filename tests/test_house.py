@@ -25,11 +25,14 @@ MAY_IMPORT = {
     "mask_painting": {"jobs", "match_session", "native", "scene", "transfer"},
     "preview": {"csr", "match_session", "scene", "transfer"},
     "weight_check": {"csr", "scene"},
-    "sculpt_session": {"csr", "native", "reporting", "scene"},
-    "properties": {"transfer"},
+    "desparsify": {"csr", "native", "reporting", "scene"},
+    "sculpt_session": {"csr", "desparsify", "native", "reporting", "scene"},
+    "sculpt_properties": {"desparsify", "sculpt_session"},
+    "properties": {"sculpt_properties", "transfer"},
     "preferences": {"native"},
     "operators": {
         "csr",
+        "desparsify",
         "jobs",
         "mask_painting",
         "match_session",
@@ -39,15 +42,18 @@ MAY_IMPORT = {
         "properties",
         "reporting",
         "scene",
+        "sculpt_properties",
         "sculpt_session",
         "transfer",
         "weight_check",
     },
-    "ui": {"jobs", "match_session", "native", "preview", "properties", "ui"},
-    "command_line": {"native", "reporting", "scene", "transfer"},
+    "ui": {"jobs", "match_session", "native", "preview", "properties", "sculpt_session", "ui"},
+    "sculpt_replay": {"native", "reporting", "scene", "sculpt_session"},
+    "command_line": {"native", "reporting", "scene", "sculpt_replay", "sculpt_session", "transfer"},
     "__init__": {"command_line", "operators", "preferences", "properties", "scene", "ui"},
 }
 MAY_SEE_BPY = {"scene", "operators", "ui", "properties", "preferences", "command_line", "transfer", "sculpt_session"}
+MAY_SEE_BPY |= {"desparsify", "sculpt_properties", "sculpt_replay"}
 MAY_SEE_BPY |= {"jobs", "mask_painting", "match_session", "preview", "weight_check"}
 MAY_SEE_THE_WHEEL = {"native"}
 

@@ -1,4 +1,4 @@
-"""The transfer without a window: `blender -c skinwright transfer ...`, and blender_scripts/transfer_weights.py.
+"""Work without a window: `blender -c skinwright transfer ...` or `sculpt ...`, and the scripts of the same names.
 
 Exit codes: 0 done, 1 failed (the sentence is on stderr), 2 wrong usage.
 """
@@ -13,11 +13,14 @@ from typing import Any
 import bpy
 
 from . import native
-from .reporting import Report
+from .reporting import Report, SculptReport
 from .scene.error import SceneError
+from .sculpt_replay import options_from_json, read, replay
+from .sculpt_session import SculptOptions
 from .transfer import TransferParams, from_json, to_json, transfer_weights
 
 DONE, FAILED, USAGE = 0, 1, 2
+Params = TransferParams | SculptOptions
 
 
 class _Failure(Exception):
@@ -25,30 +28,51 @@ class _Failure(Exception):
 
 
 def main(arguments: list[str]) -> int:
-    """`skinwright transfer ...` or `skinwright --version`; gives the exit code."""
+    """`skinwright transfer ...`, `skinwright sculpt ...` or `skinwright --version`; gives the exit code."""
     parser = argparse.ArgumentParser(prog="skinwright", description="Skin weights without a window.")
     parser.add_argument("--version", action="version", version=f"Skinwright {native.addon_version()}")
     commands = parser.add_subparsers(dest="command", required=True)
-    _add_arguments(commands.add_parser("transfer", help="transfer weights from a body to garments"))
+    _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
+    _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
     return _run(parser, arguments)
 
 
 def transfer(arguments: list[str]) -> int:
     """The same without the word `transfer`, for the script."""
-    parser = argparse.ArgumentParser(
-        prog="transfer_weights.py", description="Transfer weights from a body to garments."
-    )
-    _add_arguments(parser)
+    description = "Transfer weights from a body to garments."
+    parser = argparse.ArgumentParser(prog="transfer_weights.py", description=description)
+    _add_transfer(parser)
     return _run(parser, arguments)
 
 
-def _add_arguments(parser: argparse.ArgumentParser) -> None:
-    defaults = ", ".join(f"{name} {json.dumps(value)}" for name, value in to_json(TransferParams()).items())
-    parser.epilog = f"Settings and their defaults: {defaults}."
+def sculpt(arguments: list[str]) -> int:
+    """The same without the word `sculpt`, for the script."""
+    description = "Turn recorded sculpts of a posed mesh into weights."
+    parser = argparse.ArgumentParser(prog="sculpt_weights.py", description=description)
+    _add_sculpt(parser)
+    return _run(parser, arguments)
+
+
+def _add_transfer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
     parser.add_argument("--target", required=True, action="append", help="object to transfer to; may be repeated")
-    parser.add_argument("--settings", type=Path, help="JSON object of settings; max_normal_angle in degrees")
+    _add_common(parser, "max_normal_angle in degrees", to_json(TransferParams()))
+    parser.set_defaults(work=_transfer, read=from_json, write=to_json, default=TransferParams())
+
+
+def _add_sculpt(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
+    parser.add_argument("--target", required=True, help="object that was sculpted")
+    parser.add_argument("--sculpts", required=True, type=Path, help=".npz file of positions and poses")
+    _add_common(parser, "names as in SculptOptions", vars(SculptOptions()))
+    parser.set_defaults(work=_sculpt, read=options_from_json, write=vars, default=SculptOptions())
+
+
+def _add_common(parser: argparse.ArgumentParser, settings: str, defaults: dict[str, Any]) -> None:
+    listed = ", ".join(f"{name} {json.dumps(value)}" for name, value in defaults.items())
+    parser.epilog = f"Settings and their defaults: {listed}."
+    parser.add_argument("--settings", type=Path, help=f"JSON object of settings; {settings}")
     parser.add_argument("--threads", type=int, help="processor threads, 0 for all")
     parser.add_argument("--report", type=Path, help="write what was done as JSON")
     parser.add_argument("--save", type=Path, help="save the result as this .blend file")
@@ -61,7 +85,7 @@ def _run(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
     except SystemExit as leave:  # argparse has said what is wrong; a host application must not be ended by it
         return leave.code if isinstance(leave.code, int) else USAGE
     try:
-        report = _transfer(options, params)
+        report = _work(options, params)
         _write_report(options, params, report)
     except (_Failure, SceneError, native.NativeError, OSError) as error:
         print(f"skinwright: {error}", file=sys.stderr)
@@ -72,24 +96,31 @@ def _run(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
     return DONE
 
 
-def _params(parser: argparse.ArgumentParser, options: argparse.Namespace) -> TransferParams:
+def _params(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Params:
     try:
-        settings = json.loads(options.settings.read_text()) if options.settings else {}
-        params = from_json(settings)
+        params = options.read(json.loads(options.settings.read_text())) if options.settings else options.default
     except (OSError, ValueError) as error:
         parser.error(f"--settings {options.settings}: {error}")
     return params if options.threads is None else replace(params, threads=options.threads)
 
 
-def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
+def _work(options: argparse.Namespace, params: Params) -> Report | SculptReport:
     if native.problem():
         raise _Failure(native.problem())
     if options.blend:
         _open(options.blend)
-    report = transfer_weights(bpy.context, _object(options.source), [_object(n) for n in options.target], params)
+    report = options.work(options, params)
     if options.save:
         _save(options.save)
     return report
+
+
+def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
+    return transfer_weights(bpy.context, _object(options.source), [_object(n) for n in options.target], params)
+
+
+def _sculpt(options: argparse.Namespace, params: SculptOptions) -> SculptReport:
+    return replay(_object(options.target), read(options.sculpts), params)
 
 
 def _open(blend: Path) -> None:
@@ -115,9 +146,10 @@ def _object(name: str) -> bpy.types.Object:
     return obj
 
 
-def _write_report(options: argparse.Namespace, params: TransferParams, report: Report) -> None:
+def _write_report(options: argparse.Namespace, params: Params, report: Report | SculptReport) -> None:
     if options.report:
-        content: dict[str, Any] = {"version": native.addon_version(), "settings": to_json(params)} | report.to_json()
+        content: dict[str, Any] = {"version": native.addon_version(), "settings": options.write(params)}
+        content |= report.to_json()
         options.report.write_text(json.dumps(content, indent=2) + "\n")
 
 

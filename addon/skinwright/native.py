@@ -100,8 +100,83 @@ class Job:
         """skinwright_native.Transfer and its rows; waits for them."""
         with _naming(self._name):
             transfer = self._job.result()
-        weights = transfer.weights
-        return transfer, Rows(weights.indptr, weights.bones, weights.values)
+        return transfer, _rows(transfer.weights)
+
+
+def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
+    """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
+    with _naming(name):
+        return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
+
+
+class SculptSolver:
+    """A character prepared for strokes, with its poses, targets and undo; keyword arguments as in the stub."""
+
+    def __init__(self, name: str, rest_positions: NDArray, rows: Rows, n_bones: int, **options: Any) -> None:
+        self.name = name
+        with _naming(name):
+            self._solver = _module.SculptSolver(rest_positions, _module.Weights(*rows, n_bones), **options)
+
+    def set_options(self, kappa: float, passes: int) -> None:
+        """Says how the next strokes are solved."""
+        with _naming(self.name):
+            self._solver.set_options(kappa, passes)
+
+    def add_pose(self, pose_from_rest: NDArray) -> int:
+        """Makes (B, 4, 4) the pose that is sculpted in; gives its number, the old one if it is known."""
+        with _naming(self.name):
+            return self._solver.add_pose(pose_from_rest)
+
+    def guard(self, pose_from_rest: NDArray, alpha: float) -> None:
+        """Makes every vertex hold the position it now has in a pose (B, 4, 4)."""
+        with _naming(self.name):
+            self._solver.guard(pose_from_rest, alpha=alpha)
+
+    def guard_range_of_motion(self, parents: NDArray, heads: NDArray, joints: NDArray, alpha: float) -> None:
+        """Guards turns of the bones `joints` (n,)."""
+        with _naming(self.name):
+            self._solver.guard_range_of_motion(parents, heads, joints, alpha=alpha)
+
+    def posed(self, vertices: NDArray, rest_positions: NDArray) -> NDArray[np.float32]:
+        """(n, 3) where the rest positions (n, 3) of vertices (n,) lie in the pose added last."""
+        with _naming(self.name):
+            return self._solver.posed(vertices, rest_positions)
+
+    def stroke(self, vertices: NDArray, targets: NDArray) -> tuple[Rows, float, NDArray[np.float32]]:
+        """New rows of the vertices (n,), reachability, and what is left to their targets (n, 3)."""
+        with _naming(self.name):
+            stroke = self._solver.stroke(vertices, targets)
+        return _rows(stroke.weights), stroke.reachability, stroke.residuals
+
+    def undo(self) -> NDArray[np.uint32] | None:
+        """Takes the last stroke back; the vertices it had touched."""
+        return self._solver.undo()
+
+    def redo(self) -> NDArray[np.uint32] | None:
+        """Does it again; likewise."""
+        return self._solver.redo()
+
+    def rows(self, vertices: NDArray | None = None) -> Rows:
+        """The present rows of these vertices, or of all."""
+        return _rows(self._solver.weights(vertices))
+
+    @property
+    def stroke_count(self) -> int:
+        """Number of strokes that can be taken back."""
+        return self._solver.stroke_count
+
+    @property
+    def reachability(self) -> float | None:
+        """Of the last stroke that has not been taken back."""
+        return self._solver.reachability()
+
+    def rest_residuals(self, pose: int) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """The vertices (n,) sculpted in a pose, and the offsets (n, 3) at rest that weights cannot stand in for."""
+        return self._solver.rest_residuals(pose=pose)
+
+
+def _rows(weights: Any) -> Rows:
+    return Rows(weights.indptr, weights.bones, weights.values)
 
 
 @contextmanager

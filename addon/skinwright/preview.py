@@ -148,10 +148,13 @@ def histogram(label: str, unit: str, values: NDArray, threshold: float, high: fl
 
 
 def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
-    count = influences(vertex_groups.read(obj, _bone_names(obj)))
+    weights = vertex_groups.read(obj, _bone_names(obj))
+    count = influences(weights)
+    spare = len(weights.bones) - int(count.sum())
+    note = f"and {spare:,} members of weight 0" if spare else ""
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
-    return Picture(**shape, values=count, rows=rows)
+    return Picture(**shape, values=count, rows=rows, note=note)
 
 
 def influences(rows: Rows) -> NDArray[np.int64]:

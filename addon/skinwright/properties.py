@@ -4,6 +4,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 from bpy.types import Object, PropertyGroup, Scene, UILayout
 
+from .sculpt_properties import SKINWRIGHT_PG_sculpt
 from .transfer.params import Mask, TransferParams
 
 LENGTH_MODES = [
@@ -200,7 +201,7 @@ class SKINWRIGHT_PG_transfer(TransferOptions, PropertyGroup):
 
 
 class SKINWRIGHT_PG_object(PropertyGroup):
-    """What each target knows about itself: its match mask."""
+    """What each target knows about itself: its match mask, and whether it is being sculpted."""
 
     mask_group: StringProperty(
         name="Mask",
@@ -218,6 +219,13 @@ class SKINWRIGHT_PG_object(PropertyGroup):
         name="Threshold", description="Weight above which a vertex counts as painted", default=0.5, min=0, max=1
     )
     mask_invert: BoolProperty(name="Invert", description="Inpaint what is not painted", default=False)
+
+    sculpting: BoolProperty(
+        name="Sculpting",
+        description="Weights are being sculpted; undo has gone back to before that where this is off",
+        default=False,
+        options={"HIDDEN"},
+    )
 
     def mask(self) -> Mask | None:
         """The mask as plain values, if there is one."""
@@ -259,9 +267,16 @@ class SKINWRIGHT_PG_scene(PropertyGroup):
 
     transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
     overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
+    sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
 
 
-CLASSES = (SKINWRIGHT_PG_transfer, SKINWRIGHT_PG_object, SKINWRIGHT_PG_overlay, SKINWRIGHT_PG_scene)
+CLASSES = (
+    SKINWRIGHT_PG_transfer,
+    SKINWRIGHT_PG_object,
+    SKINWRIGHT_PG_overlay,
+    SKINWRIGHT_PG_sculpt,
+    SKINWRIGHT_PG_scene,
+)
 
 
 def register() -> None:

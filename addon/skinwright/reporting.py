@@ -1,4 +1,4 @@
-"""What a transfer has done, as a sentence with counts, as warnings, and as JSON."""
+"""What has been done, as a sentence with counts, as warnings, and as JSON."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -66,3 +66,50 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+@dataclass(frozen=True)
+class DesparsifyReport:
+    """What desparsification gave and took; `dropped` counts influences that had weight, `groups` lists new ones."""
+
+    target: str
+    vertices: int
+    n: int
+    added: int
+    dropped: int
+    groups: list[str]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        kept = f"{self.dropped} small influences dropped" if self.dropped else "no influence dropped"
+        return (
+            f"{self.target}: {self.vertices} vertices have {self.n} bones to choose from; {self.added} members of "
+            f"weight 0 added, {kept}, {len(self.groups)} groups new"
+        )
+
+
+@dataclass(frozen=True)
+class SculptReport:
+    """A session that is over; `reachability` is of each stroke, how much weights did of what was still to be done."""
+
+    target: str
+    strokes: int
+    poses: int
+    vertices: int
+    reachability: list[float]
+    shape_keys: list[str]
+    warnings: list[str] = field(default_factory=list)
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        strokes = f"{self.strokes} stroke{'s' * (self.strokes != 1)} in {self.poses} pose{'s' * (self.poses != 1)}"
+        keys = f", the rest in {', '.join(self.shape_keys)}" if self.shape_keys else ""
+        return f"{self.target}: {strokes} changed the weights of {self.vertices} vertices{keys}"
+
+    def all_warnings(self) -> list[str]:
+        """Sentences worth a look."""
+        return self.warnings
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values only."""
+        return _plain(vars(self)) | {"sentence": self.sentence()}

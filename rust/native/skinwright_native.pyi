@@ -84,6 +84,9 @@ class Source:
     """A body prepared once (checks, BVH, normals) for any number of garments. `threads` 0: all of the machine's."""
 
     def __new__(cls, positions: ArrayLike, triangles: ArrayLike, weights: Weights, *, threads: int = 0) -> Source: ...
+    def closest_points(
+        self, positions: ArrayLike, *, threads: int = 0
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]: ...
     def transfer(
         self,
         target_positions: ArrayLike,
@@ -265,6 +268,14 @@ class SculptSolver:
 
     def rest_residuals(self, *, pose: int | None = None) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """The same in rest space, T^-1 r: the offsets of a corrective shape key driven by the pose."""
+
+    def fit_rest_shape(
+        self, vertices: ArrayLike, *, stiffness: float = 0.1, rounds: int = 20
+    ) -> tuple[NDArray[np.float32], Weights]:
+        """Offsets (n, 3) to the rest positions of `vertices` (n,) and weights, one row each, that together meet what
+        was sculpted: sum_p alpha_p |T_p(w)(v + delta) - t_p|^2 + stiffness |delta|^2, by alternation. Nothing is
+        changed. A vertex sculpted in fewer than two poses gets no offset; to hold a pose, make it a stroke with `posed`
+        targets."""
 
 def simplex_qp(h: ArrayLike, g: ArrayLike, start: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
     """Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for P problems of N <= 12 unknowns at once: the

@@ -13,3 +13,9 @@ def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
 
 def test_long_work_shows_progress_and_esc_stops_it(blender):
     assert max(blender.run("long_work", size=(1100, 800))["progress"]) > 0
+
+
+def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
+    seen = blender.run("sculpt_weights", timeout=300, size=(1000, 900))
+    assert seen["strokes"] == 2
+    assert 0 < seen["reachability"] <= 1

@@ -168,6 +168,30 @@ def test_a_brush_that_moves_rest_positions():
     assert np.median(np.linalg.norm(reached - targets, axis=1)) < 1e-5
 
 
+def test_the_rest_shape_helps_where_weights_cannot():
+    rest, weights, poses = character(5)
+    solver = native.SculptSolver(rest, weights)
+    touched = np.arange(60)
+    goals = []
+    for pose in poses:
+        solver.add_pose(pose)
+        bump = np.random.default_rng(6).normal(scale=0.3, size=(60, 3))
+        goals.append(native.linear_blend(rest, weights, pose)[touched] + bump)
+        solver.stroke(touched, goals[-1])
+    offsets, rows = solver.fit_rest_shape(touched, stiffness=0.01)
+    assert offsets.shape == (60, 3) and len(rows) == 60
+
+    def left(positions, weights):
+        return sum(
+            (np.linalg.norm(native.linear_blend(positions, weights, p) - g, axis=1) ** 2).mean()
+            for p, g in zip(poses, goals, strict=True)
+        )
+
+    assert left(rest[touched] + offsets, rows) < 0.5 * left(rest[touched], solver.weights(touched))
+    with pytest.raises(native.InvalidParameter, match="stiffness is 0"):
+        solver.fit_rest_shape(touched, stiffness=0)
+
+
 def test_guards_and_locks():
     rest, weights, (pose_a, pose_b) = character(2)
     goal = native.linear_blend(rest, character(3)[1], pose_a)

@@ -177,6 +177,19 @@ def test_prepared_objects_equal_the_function(sheet):
     assert prepared.solve(max_distance=0.1, max_influences=3).report["factored_blocks"] == 0
 
 
+def test_closest_points_equal_libigl(sheet):
+    (positions, triangles, weights), _ = sheet
+    queries = np.random.default_rng(5).uniform(-0.5, 1.5, (500, 3)).astype(np.float32)
+    source = native.Source(positions, triangles, weights)
+    triangle, barycentric, distance = source.closest_points(queries)
+    squared, _, closest = oracle.igl.point_mesh_squared_distance(
+        queries.astype(float), positions.astype(float), triangles.astype(np.int64)
+    )
+    np.testing.assert_allclose(distance**2, squared, atol=1e-12)
+    corners = positions[triangles[triangle]].astype(float)
+    np.testing.assert_allclose((corners * barycentric[:, :, None]).sum(axis=1), closest, atol=1e-6)
+
+
 def test_absolute_lengths_win(sheet):
     source, target = sheet
     report = native.transfer_weights(

@@ -10,7 +10,13 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 
 def trace():
     """Everything an add-on may leave behind."""
-    menus = ("VIEW3D_MT_paint_weight", "VIEW3D_MT_make_links", "MESH_MT_vertex_group_context_menu", "VIEW3D_PT_overlay")
+    menus = (
+        "VIEW3D_MT_paint_weight",
+        "VIEW3D_MT_sculpt",
+        "VIEW3D_MT_make_links",
+        "MESH_MT_vertex_group_context_menu",
+        "VIEW3D_PT_overlay",
+    )
     return {
         "types": sorted(set(dir(bpy.types))),
         "operators": sorted(dir(bpy.ops.skinwright)),

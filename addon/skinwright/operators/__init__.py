@@ -1,5 +1,25 @@
 """Operators, one family a file."""
 
-from . import check_weights, edit_match_mask, paint_match_mask, presets, preview_match, timers, transfer_weights
+from . import (
+    check_weights,
+    desparsify,
+    edit_match_mask,
+    paint_match_mask,
+    presets,
+    preview_match,
+    sculpt_weights,
+    timers,
+    transfer_weights,
+)
 
-MODULES = (timers, transfer_weights, presets, preview_match, edit_match_mask, paint_match_mask, check_weights)
+MODULES = (
+    timers,
+    transfer_weights,
+    presets,
+    preview_match,
+    edit_match_mask,
+    paint_match_mask,
+    check_weights,
+    desparsify,
+    sculpt_weights,
+)

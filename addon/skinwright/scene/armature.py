@@ -1,6 +1,11 @@
 """Armatures: which one deforms a mesh, its bones, and attaching one."""
 
+from collections.abc import Sequence
+
 import bpy
+import numpy as np
+from mathutils import Quaternion
+from numpy.typing import NDArray
 
 
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
@@ -44,3 +49,39 @@ def attach(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     modifier.object = armature
     mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
     obj.modifiers.move(len(obj.modifiers) - 1, mirrors[-1] + 1 if mirrors else 0)
+
+
+def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:
+    """(B, 4, 4) where each bone takes a point of the mesh, in the mesh' own space (spec-sculpt, section 7).
+
+    object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world
+    """
+    armature_from_object = armature.matrix_world.inverted_safe() @ obj.matrix_world
+    object_from_armature = armature_from_object.inverted_safe()
+    if armature.data.pose_position == "REST":
+        return np.tile(np.eye(4), (len(bones), 1, 1))
+    moved = (armature.pose.bones[name].matrix @ armature.data.bones[name].matrix_local.inverted() for name in bones)
+    return np.array([object_from_armature @ matrix @ armature_from_object for matrix in moved]).reshape(-1, 4, 4)
+
+
+def segments(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float32]:
+    """(B, 2, 3) head and tail of each bone at rest, in the mesh' own space."""
+    object_from_armature = obj.matrix_world.inverted_safe() @ armature.matrix_world
+    ends = [(bone.head_local, bone.tail_local) for bone in (armature.data.bones[name] for name in bones)]
+    return np.array([[object_from_armature @ end for end in pair] for pair in ends], np.float32).reshape(-1, 2, 3)
+
+
+def parents(armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.int32]:
+    """(B,) the nearest bone above that is in `bones` too, -1 where there is none."""
+    index = {name: j for j, name in enumerate(bones)}
+    above = (armature.data.bones[name].parent_recursive for name in bones)
+    return np.array([next((index[p.name] for p in ps if p.name in index), -1) for ps in above], np.int32)
+
+
+def local_rotations(armature: bpy.types.Object) -> dict[str, Quaternion]:
+    """How each bone is turned against its parent and rest, constraints included."""
+    convert = armature.convert_space
+    return {
+        bone.name: convert(pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL").to_quaternion()
+        for bone in armature.pose.bones
+    }

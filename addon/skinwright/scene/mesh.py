@@ -159,7 +159,7 @@ def rest_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """(V, 3) local positions that modifiers start from."""
     # With shape keys it is the Basis that the armature deforms; the mesh's own positions may lag behind it.
     if mesh.shape_keys:
-        return _vectors(mesh.shape_keys.reference_key.data, "co")
+        return vectors(mesh.shape_keys.reference_key.data, "co")
     return positions(mesh)
 
 
@@ -167,10 +167,11 @@ def positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """(V, 3) local positions of a mesh, evaluated or not."""
     if not mesh.vertices:
         return np.empty((0, 3), np.float32)
-    return _vectors(mesh.attributes["position"].data, "vector")
+    return vectors(mesh.attributes["position"].data, "vector")
 
 
-def _vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32]:
+def vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32]:
+    """(n, 3) of a vector property of every element."""
     values = np.empty(len(collection) * 3, np.float32)
     collection.foreach_get(name, values)
     return values.reshape(-1, 3)

@@ -1,11 +1,13 @@
 """Test poses: an armature is put into each in turn, and afterwards is as it was."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
+import numpy as np
 from mathutils import Matrix
+from numpy.typing import NDArray
 
 from .error import SceneError
 
@@ -35,7 +37,7 @@ def keyframes(armature: bpy.types.Object, most: int) -> Iterator[str]:
     scene = bpy.context.scene
     frames = sorted({round(key.co[0]) for curve in _curves(armature) for key in curve.keyframe_points})
     if not frames:
-        raise SceneError(f"{armature.name} has no keyframes to test: give it an action or set Poses to Range of Motion")
+        raise SceneError(f"{armature.name} has no keyframes: give it an action, or choose Range of Motion")
     before = scene.frame_current, scene.frame_subframe
     with _restored(armature):
         try:
@@ -44,6 +46,28 @@ def keyframes(armature: bpy.types.Object, most: int) -> Iterator[str]:
                 yield f"frame {frame}"
         finally:
             scene.frame_set(before[0], subframe=before[1])
+
+
+def recorded(armature: bpy.types.Object, bones: Sequence[str], basis: NDArray[np.floating]) -> Iterator[int]:
+    """Give the bones (B,) their matrices `basis` (P, B, 4, 4), one pose after the other; yields its number."""
+    with _restored(armature):
+        for number, matrices in enumerate(basis):
+            for name, matrix in zip(bones, matrices, strict=True):
+                armature.pose.bones[name].matrix_basis = Matrix(matrix.tolist())
+            bpy.context.view_layer.update()
+            yield number
+
+
+def frames(numbers: Sequence[int]) -> Iterator[int]:
+    """Show frames of the scene one after the other; yields how many have been shown before."""
+    scene = bpy.context.scene
+    before = scene.frame_current, scene.frame_subframe
+    try:
+        for number, frame in enumerate(numbers):
+            scene.frame_set(frame)
+            yield number
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """Entries in Blender's own menus."""
 
-from bpy.types import Context, Menu, VIEW3D_MT_make_links, VIEW3D_MT_paint_weight
+from bpy.types import Context, Menu, VIEW3D_MT_make_links, VIEW3D_MT_paint_weight, VIEW3D_MT_sculpt
 
 
 def _transfer_weights(menu: Menu, _context: Context) -> None:
@@ -8,7 +8,21 @@ def _transfer_weights(menu: Menu, _context: Context) -> None:
     menu.layout.operator("skinwright.transfer_weights", text="Transfer Weights (Skinwright)")
 
 
-ENTRIES = ((VIEW3D_MT_paint_weight, _transfer_weights), (VIEW3D_MT_make_links, _transfer_weights))
+def _paint_weight(menu: Menu, context: Context) -> None:
+    _transfer_weights(menu, context)
+    menu.layout.operator("skinwright.desparsify", text="Desparsify Weights (Skinwright)")
+
+
+def _sculpt_weights(menu: Menu, _context: Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator("skinwright.sculpt_weights", text="Sculpt Weights (Skinwright)")
+
+
+ENTRIES = (
+    (VIEW3D_MT_paint_weight, _paint_weight),
+    (VIEW3D_MT_make_links, _transfer_weights),
+    (VIEW3D_MT_sculpt, _sculpt_weights),
+)
 
 
 def register() -> None:

@@ -50,27 +50,27 @@ fn queries(spread: f32) -> Vec<[f32; 3]> {
     (0..100_000).map(place).collect()
 }
 
-#[divan::bench(args = SIDES)]
+#[divan::bench(args = SIDES, sample_count = 15)]
 fn build(bencher: Bencher, side: u32) {
     let torus = Torus::new(side);
     bencher.bench(|| SurfaceIndex::new(black_box(&torus.mesh())));
 }
 
-#[divan::bench(args = SIDES)]
+#[divan::bench(args = SIDES, sample_count = 15)]
 fn near_the_surface(bencher: Bencher, side: u32) {
     let index = SurfaceIndex::new(&Torus::new(side).mesh());
     let queries = queries(0.0);
     bencher.counter(queries.len()).bench(|| index.closest_points(black_box(&queries)));
 }
 
-#[divan::bench(args = SIDES)]
+#[divan::bench(args = SIDES, sample_count = 15)]
 fn far_from_the_surface(bencher: Bencher, side: u32) {
     let index = SurfaceIndex::new(&Torus::new(side).mesh());
     let queries = queries(0.5);
     bencher.counter(queries.len()).bench(|| index.closest_points(black_box(&queries)));
 }
 
-#[divan::bench(args = SIDES)]
+#[divan::bench(args = SIDES, sample_count = 15)]
 fn vertex_normals(bencher: Bencher, side: u32) {
     let torus = Torus::new(side);
     bencher.bench(|| black_box(torus.mesh()).vertex_normals());

@@ -77,16 +77,12 @@ fn problem<const N: usize>(family: Family, random: &mut Random) -> (SimplexQp<N>
             _ => {}
         }
         let e = d.map(|d| (d - target) / scale);
-        for i in 0..N {
-            for j in 0..N {
-                qp.h[i][j] += e[i].dot(e[j]);
-            }
+        for (row, e_i) in qp.h.iter_mut().zip(e) {
+            row.iter_mut().zip(e).for_each(|(entry, e_j)| *entry += e_i.dot(e_j));
         }
     }
-    for j in 0..N {
-        qp.h[j][j] += PULL;
-        qp.g[j] = PULL * start[j];
-    }
+    (0..N).for_each(|j| qp.h[j][j] += PULL);
+    qp.g = start.map(|o| PULL * o);
     (qp, start)
 }
 
@@ -284,12 +280,12 @@ proptest! {
         let poses = [0, 1].map(|p| solver.add_pose(character.poses[p].clone(), 1.0).unwrap());
         let mut states = vec![solver.weights()];
         let mut strokes = Vec::new();
-        for s in 0..4usize {
+        for (s, pose) in [poses[0], poses[1], poses[0], poses[1]].into_iter().enumerate() {
             let vertices: Vec<u32> = (0..30).filter(|i| (i + s as u32) % 3 > 0).collect();
             let targets: Vec<[f32; 3]> = vertices.iter().map(|_| random.point().as_vec3().to_array()).collect();
-            solver.stroke(poses[s % 2], &vertices, &targets).unwrap();
+            solver.stroke(pose, &vertices, &targets).unwrap();
             states.push(solver.weights());
-            strokes.push((poses[s % 2], vertices, targets));
+            strokes.push((pose, vertices, targets));
         }
         for s in (0..4).rev() {
             prop_assert_eq!(solver.undo(), Some(strokes[s].1.as_slice()));
@@ -476,6 +472,71 @@ fn residuals_are_what_is_left_and_the_rest_residual_makes_up_for_it() {
         (0..40).filter(|&k| Vec3::from(reached[k]).distance(Vec3::from(targets[k + 10])) > 1e-3).collect();
     assert!(far.len() <= 4, "all but the nearly singular blends land on the sculpt: {far:?}");
     assert!(offsets.vectors.iter().flatten().all(|x| x.is_finite()));
+}
+
+/// A bump that weights cannot make: every bone turns the same way in both poses, so only the rest shape can follow.
+#[test]
+fn the_rest_shape_follows_where_weights_cannot() {
+    let character = Character::random(19, 40, 4, 1.0, vec![]);
+    let mut solver = character.solver();
+    let mut poses = [0, 1].map(|p| vec![character.poses[p][0]; BONES as usize]);
+    poses[1][5] = poses[1][0] * DAffine3::from_translation(DVec3::X);
+    let bump = Vec3::new(0.1, -0.2, 0.3);
+    let bumped: Vec<[f32; 3]> = character.rest.iter().map(|&p| (Vec3::from(p) + bump).to_array()).collect();
+    let vertices: Vec<u32> = (0..30).collect();
+    for pose in &poses {
+        let number = solver.add_pose(pose.clone(), 1.0).unwrap();
+        let goals = linear_blend(&bumped, &character.weights, pose).unwrap();
+        solver.stroke(number, &vertices, &goals[..30]).unwrap();
+    }
+    let before = solver.weights();
+    let loose = solver.fit_rest_shape(&character.all(), 1e-6, 50).unwrap();
+    assert_eq!(solver.weights(), before, "nothing has changed");
+    for (k, offset) in loose.offsets.iter().enumerate() {
+        let expected = if k < 30 { bump } else { Vec3::ZERO };
+        assert!(Vec3::from(*offset).distance(expected) < 0.02, "{k}: {offset:?}");
+        assert!((loose.weights.row(k).1.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        assert!(k < 30 || loose.weights.row(k) == before.row(k));
+    }
+    let stiff = solver.fit_rest_shape(&vertices, 1e6, 5).unwrap();
+    assert!(stiff.offsets.iter().flatten().all(|x| x.abs() < 1e-5));
+    assert!(solver.fit_rest_shape(&vertices, 0.0, 5).is_err());
+    assert!(solver.fit_rest_shape(&[99], 0.1, 5).is_err());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn more_rounds_of_the_rest_shape_never_do_worse(seed in any::<u64>(), stiffness in 0.01f64..1.0) {
+        let character = Character::random(seed, 20, 4, 1.0, vec![]);
+        let mut random = Random(seed | 1);
+        let mut solver = character.solver();
+        let mut goals = Vec::new();
+        for pose in 0..3 {
+            let number = solver.add_pose(character.poses[pose].clone(), 1.0).unwrap();
+            goals.push(character.targets(&mut random, pose, 0.3));
+            solver.stroke(number, &character.all(), &goals[pose]).unwrap();
+        }
+        let mut last = vec![f64::INFINITY; 20];
+        for rounds in [0, 1, 3, 10] {
+            let shape = solver.fit_rest_shape(&character.all(), stiffness, rounds).unwrap();
+            let moved: Vec<[f32; 3]> = (0..20)
+                .map(|i| (Vec3::from(character.rest[i]) + Vec3::from(shape.offsets[i])).to_array()).collect();
+            let mut objective: Vec<f64> =
+                shape.offsets.iter().map(|&d| stiffness * Vec3::from(d).as_dvec3().length_squared()).collect();
+            for (pose, goals) in goals.iter().enumerate() {
+                let posed = linear_blend(&moved, &shape.weights, &character.poses[pose]).unwrap();
+                for (sum, (&p, &t)) in objective.iter_mut().zip(posed.iter().zip(goals)) {
+                    *sum += Vec3::from(p).as_dvec3().distance_squared(Vec3::from(t).as_dvec3());
+                }
+            }
+            for (now, before) in objective.iter().zip(&last) {
+                prop_assert!(*now <= before * (1.0 + 1e-5) + 1e-9, "{} > {}", now, before);
+            }
+            last = objective;
+        }
+    }
 }
 
 #[test]

@@ -206,6 +206,20 @@ impl SculptSolver {
         let pose = self.pose(py, pose)?;
         present(py, self.enter(py, |session| session.solver.rest_residuals(pose))?)
     }
+
+    /// Rest offsets and weights that together meet the sculpts of `vertices`; changes nothing.
+    #[pyo3(signature = (vertices, *, stiffness=0.1, rounds=20))]
+    fn fit_rest_shape<'py>(
+        &self,
+        py: Python<'py>,
+        vertices: Vector<'py, u32>,
+        stiffness: f64,
+        rounds: usize,
+    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Weights)> {
+        let vertices = entries(&vertices);
+        let shape = self.enter(py, |session| session.solver.fit_rest_shape(&vertices, stiffness, rounds))?;
+        Ok((vectors(py, shape.offsets)?, Weights::from_core(py, shape.weights)?))
+    }
 }
 
 /// Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for every problem of a stack.

@@ -161,6 +161,24 @@ impl Source {
         Ok(Self { core })
     }
 
+    /// The closest point of this body to each of (Q, 3) positions: its triangle (Q,), barycentric coordinates (Q, 3) and
+    /// distance (Q,).
+    #[pyo3(signature = (positions, *, threads=0))]
+    fn closest_points<'py>(
+        &self,
+        py: Python<'py>,
+        positions: Matrix<'_, f32>,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let positions = triples(&positions, "positions")?;
+        let points = enter(py, threads, || Ok(self.core.index().closest_points(&positions)))?;
+        let triangles = points.iter().map(|point| point.triangle).collect();
+        let barycentric = points.iter().flat_map(|point| point.barycentric).collect();
+        let distances = points.iter().map(|point| point.distance).collect();
+        let barycentric = PyArray1::from_vec(py, barycentric).reshape([points.len(), 3])?;
+        Ok((PyArray1::from_vec(py, triangles), barycentric, PyArray1::from_vec(py, distances)))
+    }
+
     /// Transfers this body's weights to one garment. The settings are those of `transfer_weights`.
     #[pyo3(signature = (target_positions, target_triangles, *, threads=0, **settings))]
     fn transfer(

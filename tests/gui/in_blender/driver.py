@@ -132,4 +132,5 @@ def start(steps: Callable[[Window], Steps]) -> None:
         # An orderly quit may stumble over what a failed step left running.
         os._exit(code)
 
-    bpy.app.timers.register(turn, first_interval=1.0)
+    # Persistent, or loading a file would end the test.
+    bpy.app.timers.register(turn, first_interval=1.0, persistent=True)

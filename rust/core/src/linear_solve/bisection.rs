@@ -30,9 +30,9 @@ impl Plane {
     }
 }
 
-/// Puts the lower half of `points` along `axis` first. The same `origin` (a point among them) gives the same halves
-/// whatever order the points come in; another one rounds otherwise, and points near the plane change sides.
-pub(super) fn halve(points: &mut [Point], axis: Vec3, origin: Vec3) -> Plane {
+/// Puts the lower half of `points` along `axis` first.
+pub(super) fn halve(points: &mut [Point], axis: Vec3) -> Plane {
+    let origin = points[0].position;
     for point in points.iter_mut() {
         point.key = axis.dot(point.position - origin);
     }
@@ -67,7 +67,7 @@ fn dominant_axis(covariance: DMat3) -> DVec3 {
     let mut power = covariance;
     for _ in 0..8 {
         let scale = power.x_axis.x + power.y_axis.y + power.z_axis.z;
-        power = power * (1.0 / scale.max(f64::MIN_POSITIVE));
+        power *= 1.0 / scale.max(f64::MIN_POSITIVE);
         power = power * power;
     }
     let columns = [power.x_axis, power.y_axis, power.z_axis];

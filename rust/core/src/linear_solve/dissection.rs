@@ -1,8 +1,9 @@
 //! Nested dissection by coordinates: cut the point cloud in half, take out the unknowns that couple the halves, repeat.
 
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::bisection::{Plane, Point, halve, principal_axes};
 use super::graph::Graph;
@@ -34,15 +35,19 @@ pub(super) struct Dissection {
     pub(super) nodes: Vec<Node>,
 }
 
+/// Largest coordinate used; squared distances stay finite.
+const FAR: f32 = 1e18;
+/// In the list of places: not ordered yet, and in a separator but without a place so far.
+const FREE: u32 = u32::MAX;
+const SEPARATOR: u32 = u32::MAX - 1;
+
 /// Orders the unknowns of `graph`. `None` when separators turn out large: the graph is no surface with these positions.
 pub(super) fn dissect(graph: &Graph, positions: &[Vec3]) -> Option<Dissection> {
-    let mut points = points(graph, positions);
-    let cutter = Cutter {
-        graph,
-        positions,
-        removed: (0..points.len()).map(|_| AtomicBool::new(false)).collect(),
-        place: (0..points.len()).map(|_| AtomicU32::new(u32::MAX)).collect(),
-    };
+    let finite = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-FAR, FAR) };
+    let positions: Vec<Vec3> = positions.iter().map(|p| Vec3::new(finite(p.x), finite(p.y), finite(p.z))).collect();
+    let mut points = points(graph, &positions);
+    let place = (0..points.len()).map(|_| AtomicU32::new(FREE)).collect();
+    let cutter = Cutter { graph, positions: &positions, place };
     let nodes = cutter.dissect(&mut points, 0)?;
     Some(Dissection {
         order: points.iter().map(|point| point.unknown).collect(),
@@ -53,17 +58,17 @@ pub(super) fn dissect(graph: &Graph, positions: &[Vec3]) -> Option<Dissection> {
 
 fn points(graph: &Graph, positions: &[Vec3]) -> Vec<Point> {
     let point = |(i, &position): (usize, &Vec3)| {
-        let reach = graph.neighbours(i).map(|j| position.distance_squared(positions[j])).fold(0.0, f32::max).sqrt();
-        Point { position, reach, unknown: i as u32, key: 0.0 }
+        let farthest = graph.neighbours(i).map(|j| position.distance_squared(positions[j])).fold(0.0, f32::max);
+        Point { position, reach: farthest.sqrt(), unknown: i as u32, key: 0.0 }
     };
-    positions.iter().enumerate().map(point).collect()
+    positions.par_iter().with_min_len(FORK).enumerate().map(point).collect()
 }
 
 struct Cutter<'a> {
     graph: &'a Graph<'a>,
     positions: &'a [Vec3],
-    /// Unknowns already in a separator.
-    removed: Vec<AtomicBool>,
+    /// Place of each unknown, [`FREE`] or [`SEPARATOR`]; of the set at hand, passing notes. Sets that are cut at the same
+    /// time share no unknown, and no neighbour but in separators.
     place: Vec<AtomicU32>,
 }
 
@@ -98,16 +103,24 @@ impl Cutter<'_> {
     /// Orders a small set and returns its nodes.
     fn patch(&self, points: &mut [Point]) -> Vec<Node> {
         self.number(points, 0);
-        let local = |j: usize| self.place[j].load(Ordering::Relaxed) as usize;
-        let neighbours = |i: u32| self.graph.neighbours(i as usize).filter(|&j| !self.is_removed(j)).map(local);
+        let neighbours =
+            |i: u32| self.graph.neighbours(i as usize).map(|j| self.place(j)).filter(|&local| local != SEPARATOR);
         let mut nodes = Vec::new();
         Patch::new(points, neighbours).dissect(points, &mut nodes);
         nodes
     }
 
+    fn place(&self, unknown: usize) -> u32 {
+        self.place[unknown].load(Ordering::Relaxed)
+    }
+
+    fn set_place(&self, unknown: u32, place: u32) {
+        self.place[unknown as usize].store(place, Ordering::Relaxed);
+    }
+
     fn number(&self, points: &[Point], first: usize) {
         for (place, point) in points.iter().enumerate() {
-            self.place[point.unknown as usize].store((first + place) as u32, Ordering::Relaxed);
+            self.set_place(point.unknown, (first + place) as u32);
         }
     }
 
@@ -116,20 +129,20 @@ impl Cutter<'_> {
     fn sort_separator(&self, separator: &mut [Point], first: usize, end: usize) {
         let descendants = first as u32..end as u32;
         separator.sort_by_cached_key(|point| {
-            let places = self.graph.neighbours(point.unknown as usize).map(|j| self.place[j].load(Ordering::Relaxed));
+            let places = self.graph.neighbours(point.unknown as usize).map(|j| self.place(j));
             (places.filter(|place| descendants.contains(place)).min(), point.unknown)
         });
     }
 
     /// Moves the points into the order (below, above, separator) and returns the first two's sizes.
     fn cut(&self, points: &mut [Point]) -> (usize, usize) {
-        let (axes, origin) = (principal_axes(points), points[0].position);
+        let axes = principal_axes(points);
         let tried = if points.len() > TRY_AXES { axes.len() } else { 1 };
-        let plane = halve(points, axes[0], origin);
+        let plane = halve(points, axes[0]);
         let mut best = self.separator(points, plane);
         let (mut chosen, mut last) = (0, 0);
-        for axis in 1..tried {
-            let plane = halve(points, axes[axis], origin);
+        for (axis, &direction) in axes.iter().enumerate().take(tried).skip(1) {
+            let plane = halve(points, direction);
             let separator = self.separator(points, plane);
             last = axis;
             if separator.len() < best.len() {
@@ -137,21 +150,17 @@ impl Cutter<'_> {
             }
         }
         if chosen != last {
-            halve(points, axes[chosen], origin);
+            halve(points, axes[chosen]);
         }
         for &unknown in &best {
-            self.removed[unknown as usize].store(true, Ordering::Relaxed);
+            self.set_place(unknown, SEPARATOR);
         }
         let middle = points.len() / 2;
-        let kept = |point: &Point| !self.is_removed(point.unknown as usize);
+        let kept = |point: &Point| self.place(point.unknown as usize) != SEPARATOR;
         let below = first_where(&mut points[..middle], kept);
         let above = first_where(&mut points[middle..], kept);
         points[below..].rotate_left(middle - below);
         (below, above)
-    }
-
-    fn is_removed(&self, unknown: usize) -> bool {
-        self.removed[unknown].load(Ordering::Relaxed)
     }
 
     /// Unknowns without which no two of `points` on different sides of `plane` are coupled; as few as there can be.
@@ -161,24 +170,24 @@ impl Cutter<'_> {
         let far = |point: &&Point| (point.key - plane.key).abs() > 1.0001 * point.reach + slack;
         let mut upper = Vec::new();
         for point in above.iter().filter(|point| !far(point)) {
-            let crosses = |j| !self.is_removed(j) && plane.is_below(self.positions[j], j as u32);
+            let crosses = |j| self.place(j) != SEPARATOR && plane.is_below(self.positions[j], j as u32);
             if self.graph.neighbours(point.unknown as usize).any(crosses) {
-                self.place[point.unknown as usize].store(upper.len() as u32, Ordering::Relaxed);
+                self.set_place(point.unknown, upper.len() as u32);
                 upper.push(point.unknown);
             }
         }
         let (mut lower, mut starts, mut edges) = (Vec::new(), vec![0], Vec::new());
         for point in below.iter().filter(|point| !far(point)) {
-            let crosses = |&j: &usize| !self.is_removed(j) && !plane.is_below(self.positions[j], j as u32);
+            let crosses = |&j: &usize| self.place(j) != SEPARATOR && !plane.is_below(self.positions[j], j as u32);
             let across = self.graph.neighbours(point.unknown as usize).filter(crosses);
-            edges.extend(across.map(|j| self.place[j].load(Ordering::Relaxed)));
+            edges.extend(across.map(|j| self.place(j)));
             if edges.len() > starts[lower.len()] as usize {
                 lower.push(point.unknown);
                 starts.push(edges.len() as u32);
             }
         }
         for &unknown in &upper {
-            self.place[unknown as usize].store(u32::MAX, Ordering::Relaxed);
+            self.set_place(unknown, FREE);
         }
         let (left, right) = minimum_vertex_cover(&starts, &edges, upper.len());
         left.iter().map(|&i| lower[i as usize]).chain(right.iter().map(|&i| upper[i as usize])).collect()

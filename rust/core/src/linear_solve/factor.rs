@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use pulp::Arch;
 
-use super::blocks::{BLOCK, panel_index, triangle_len};
+use super::blocks::{BLOCK, panel_index};
 use super::buffer::Buffer;
+use super::extend_add::{Child, add_children};
 use super::graph::Graph;
 use super::kernels::{Eliminate, Pivot, Product};
 use super::tree::{Front, Tree};
@@ -14,7 +15,7 @@ use super::walk::{Plan, Received, Visit, walk};
 use super::{NotPositive, pivot_floor};
 
 /// Work of a front (multiplications) worth a second thread.
-const FORK: usize = 1 << 21;
+pub(super) const FORK: usize = 1 << 21;
 /// Block columns that are eliminated on one thread before all threads use them on the rows below.
 const PIVOT_BLOCKS: usize = 16;
 
@@ -59,14 +60,20 @@ impl Visit for Factor<'_> {
     ) -> Result<(), NotPositive> {
         let front = &self.tree.fronts[index];
         self.assemble(front, panel);
-        let children: Vec<Child> = front.children.iter().map(|&child| self.child(child, front, &received)).collect();
-        for child in &children {
-            child.add_to_panel(front.columns, panel);
-        }
+        let children: Vec<Child> = front
+            .children
+            .iter()
+            .map(|&index| {
+                let child = &self.tree.fronts[index];
+                Child::new(self.arch, &child.in_parent, front.columns, received.from(index, child.update_len()))
+            })
+            .collect();
+        let mut rows = row_blocks(panel, front.columns);
         if front.columns == 0 {
             update.fill(0.0);
+        } else {
+            children.iter().for_each(|child| child.add_to_panel(&mut rows));
         }
-        let mut rows = row_blocks(panel, front.columns);
         self.eliminate_columns(front, &mut rows)?;
         let lower: Vec<&[f64]> = rows[front.columns.div_ceil(BLOCK)..].iter().map(|row| &**row).collect();
         let mut update = update_blocks(update);
@@ -93,18 +100,6 @@ impl Factor<'_> {
                 };
                 panel[panel_index(front.columns, row, column)] = value;
             }
-        }
-    }
-
-    fn child<'r>(&'r self, index: usize, parent: &Front, received: &Received<'r>) -> Child<'r> {
-        let child = &self.tree.fronts[index];
-        let inside = child.in_parent.partition_point(|&place| (place as usize) < parent.columns);
-        let column = |&place: &u32| BLOCK as u32 * (place - parent.columns as u32);
-        Child {
-            in_parent: &child.in_parent,
-            inside,
-            outside: child.in_parent[inside..].iter().map(column).collect(),
-            update: received.from(index, child.update_len()),
         }
     }
 
@@ -181,20 +176,9 @@ fn eliminate(arch: Arch, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks:
     }
 }
 
-/// Adds the children's updates to the row blocks of the parent's update from `first` on.
-fn add_children(update: &mut [&mut [f64]], first: usize, children: &[Child]) {
-    if update.len() > 3 && BLOCK * BLOCK * update.len() * (first + update.len()) > FORK / 4 {
-        let middle = middle_row(first, update.len(), usize::MAX);
-        let (left, right) = update.split_at_mut(middle);
-        rayon::join(|| add_children(left, first, children), || add_children(right, first + middle, children));
-    } else {
-        children.iter().for_each(|child| child.add_to_update(update, first));
-    }
-}
-
 /// Splits `count` row blocks from `first` on, each as long as its number but no longer than `most`, into halves of about
 /// the same work; whole groups of three.
-fn middle_row(first: usize, count: usize, most: usize) -> usize {
+pub(super) fn middle_row(first: usize, count: usize, most: usize) -> usize {
     let tenths = if first >= most {
         5
     } else if first == 0 {
@@ -203,50 +187,6 @@ fn middle_row(first: usize, count: usize, most: usize) -> usize {
         6
     };
     (count * tenths / 10 / 3 * 3).max(3)
-}
-
-/// An update on its way into the parent's front.
-struct Child<'a> {
-    in_parent: &'a [u32],
-    /// Number of its rows that are columns of the parent.
-    inside: usize,
-    /// Where the columns of its other rows start in a row block of the parent's update.
-    outside: Vec<u32>,
-    update: &'a [f64],
-}
-
-impl Child<'_> {
-    /// Row `i` of the update, as blocks of eight rows of which lane `i % 8` is meant.
-    fn row(&self, i: usize) -> &[[f64; BLOCK]] {
-        self.update[triangle_len(i / BLOCK)..].as_chunks().0
-    }
-
-    /// Adds the columns that the parent eliminates.
-    fn add_to_panel(&self, columns: usize, panel: &mut [f64]) {
-        let rows = if self.inside == 0 { &[] } else { self.in_parent };
-        for (i, &place) in rows.iter().enumerate() {
-            let start = panel_index(columns, place as usize, 0);
-            let row = &mut panel[start..];
-            for (&column, values) in self.in_parent[..self.inside.min(i + 1)].iter().zip(self.row(i)) {
-                row[BLOCK * column as usize] += values[i % BLOCK];
-            }
-        }
-    }
-
-    /// Adds the rest to the row blocks `update` of the parent's update, of which `first` is the first.
-    fn add_to_update(&self, update: &mut [&mut [f64]], first: usize) {
-        let span = (BLOCK * BLOCK * first) as u32..(BLOCK * BLOCK * (first + update.len())) as u32;
-        let start = self.outside.partition_point(|&row| row < span.start);
-        let end = self.outside.partition_point(|&row| row < span.end);
-        for row in start..end {
-            let i = self.inside + row;
-            let place = self.outside[row] as usize / BLOCK;
-            let target = &mut update[place / BLOCK - first][place % BLOCK..];
-            for (&column, values) in self.outside[..=row].iter().zip(&self.row(i)[self.inside..]) {
-                target[column as usize] += values[i % BLOCK];
-            }
-        }
-    }
 }
 
 /// The row blocks of a panel, those of its triangle first.

@@ -39,6 +39,13 @@ pub(super) struct Multifrontal {
 }
 
 impl Multifrontal {
+    /// Multiplications and additions that factoring `matrix` takes; `None` if it is no surface with these positions.
+    pub(super) fn flops(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Option<f64> {
+        let graph = Graph::new(matrix);
+        let tree = Tree::new(&graph, dissect(&graph, positions)?);
+        Some(tree.fronts[tree.root()].subtree_flops)
+    }
+
     /// Factors `matrix`; `None` if it is no surface with these positions.
     pub(super) fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Option<Self>, NotPositive> {
         let graph = Graph::new(matrix);
@@ -48,33 +55,6 @@ impl Multifrontal {
         let panels = factor(&tree, &graph, arch)?;
         let (trusted, substitute) = (OnceLock::new(), OnceLock::new());
         Ok(Some(Self { tree, panels, arch, matrix: matrix.clone(), trusted, substitute }))
-    }
-
-    pub(super) fn time(matrix: &SymmetricMatrix, positions: &[Vec3], clock: &dyn Fn() -> f64) {
-        let t0 = clock();
-        let graph = Graph::new(matrix);
-        let t1 = clock();
-        let dissection = dissect(&graph, positions).unwrap();
-        let t2 = clock();
-        let tree = Tree::new(&graph, dissection);
-        let t3 = clock();
-        let panels = factor(&tree, &graph, Arch::new()).unwrap();
-        let t4 = clock();
-        let root = &tree.fronts[tree.root()];
-        println!(
-            "graph {:.4} dissect {:.4} tree {:.4} factor {:.4} ({:.1} GF/s) fronts {} panels {:.3}M flops {:.3e} rows {:.3}M updates {:.3}M {}",
-            t1 - t0,
-            t2 - t1,
-            t3 - t2,
-            t4 - t3,
-            root.subtree_flops / (t4 - t3) * 1e-9,
-            tree.fronts.len(),
-            root.subtree_panels as f64 * 1e-6,
-            root.subtree_flops * 1.0,
-            tree.fronts.iter().map(|f| f.rows.len()).sum::<usize>() as f64 * 1e-6,
-            tree.fronts.iter().map(|f| f.update_len()).sum::<usize>() as f64 * 1e-6,
-            panels.len()
-        );
     }
 
     /// Solves in place, `rhs` (n, columns) row-major.
@@ -168,13 +148,13 @@ impl Multifrontal {
 mod tests {
     use super::*;
 
-    /// A chain of unknowns, each coupled to its next two.
+    /// A chain of unknowns, each coupled to its next thirty.
     fn chain(n: usize) -> (SymmetricMatrix, Vec<Vec3>) {
         let mut matrix = SymmetricMatrix { column_starts: vec![0], ..Default::default() };
         for j in 0..n {
-            for (offset, value) in [6.1, -4.0, 1.0].into_iter().enumerate().take(n - j) {
+            for offset in 0..31.min(n - j) {
                 matrix.rows.push((j + offset) as u32);
-                matrix.values.push(value);
+                matrix.values.push(if offset == 0 { 60.5 } else { -1.0 });
             }
             matrix.column_starts.push(matrix.rows.len());
         }
@@ -191,6 +171,34 @@ mod tests {
         factor.solve_in_place(&mut x, 70);
         Supernodal::factor(&matrix).unwrap().solve_in_place(&mut wanted, 70);
         x.iter().zip(&wanted).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+    }
+
+    /// Every instruction set this machine has.
+    fn instruction_sets() -> Vec<Arch> {
+        let mut sets = vec![Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+            sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+        }
+        sets
+    }
+
+    #[test]
+    fn solves_on_every_instruction_set() {
+        let (matrix, positions) = chain(1500);
+        let rhs: Vec<f64> = (0..1500 * 29).map(|i| (i as f64).sin()).collect();
+        let mut wanted = rhs.clone();
+        Supernodal::factor(&matrix).unwrap().solve_in_place(&mut wanted, 29);
+        for arch in instruction_sets() {
+            let mut solver = Multifrontal::factor(&matrix, &positions).unwrap().unwrap();
+            solver.arch = arch;
+            solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch).unwrap();
+            let mut x = rhs.clone();
+            solver.solve_in_place(&mut x, 29);
+            let worst = x.iter().zip(&wanted).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+            assert!(worst < 1e-9 && solver.trusted.get() == Some(&true), "{arch:?}: {worst:e}");
+        }
     }
 
     #[test]

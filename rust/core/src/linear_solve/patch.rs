@@ -22,10 +22,10 @@ pub(super) struct Patch {
 impl Patch {
     /// Takes the couplings of `points`, of which the neighbours are given as indices into `points`. The points' numbers
     /// become those indices.
-    pub(super) fn new<N: Iterator<Item = usize>>(points: &[Point], neighbours: impl Fn(u32) -> N) -> Self {
+    pub(super) fn new<N: Iterator<Item = u32>>(points: &[Point], neighbours: impl Fn(u32) -> N) -> Self {
         let set = |point: &Point| {
             let mut set = Set::default();
-            neighbours(point.unknown).for_each(|j| insert(&mut set, j));
+            neighbours(point.unknown).for_each(|local| insert(&mut set, local as usize));
             set
         };
         Self { neighbours: points.iter().map(set).collect(), place: vec![0; points.len()], ordered: 0 }
@@ -43,8 +43,7 @@ impl Patch {
         if points.len() <= LEAF {
             return self.finish(points, 0, nodes);
         }
-        let origin = points[0].position;
-        halve(points, principal_axes(points)[0], origin);
+        halve(points, principal_axes(points)[0]);
         let middle = points.len() / 2;
         let (below, above) = (set_of(&points[..middle]), set_of(&points[middle..]));
         let touches = |point: &Point, other: &Set| intersects(&self.neighbours[point.unknown as usize], other);

@@ -8,6 +8,7 @@
 
 mod range_of_motion;
 mod residual;
+mod rest_shape;
 mod simplex_qp;
 mod stroke;
 mod vertex;
@@ -16,6 +17,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use residual::Residuals;
+pub use rest_shape::RestShape;
 pub use simplex_qp::SimplexQp;
 pub use stroke::Stroke;
 
@@ -183,14 +185,16 @@ impl SculptSolver {
     /// [`Error::InvalidParameter`] if a vertex is not there.
     pub fn weights_of(&self, vertices: &[u32]) -> Result<Weights> {
         self.check_vertices(vertices)?;
-        let (mut indptr, mut bones, mut values) = (vec![0], Vec::new(), Vec::new());
-        for &i in vertices {
-            let (row_bones, row_values) = self.row(i as usize);
-            bones.extend_from_slice(row_bones);
-            values.extend_from_slice(row_values);
-            indptr.push(bones.len() as u32);
-        }
-        Weights::new(indptr, bones, values, self.locked.len() as u32)
+        Ok(self.rows_of(vertices, |_, i| self.row(i).1))
+    }
+
+    /// Rows of `vertices` with the values that `values` gives for the k-th of them, vertex i.
+    fn rows_of<'v>(&self, vertices: &[u32], values: impl Fn(usize, usize) -> &'v [f32] + Sync) -> Weights {
+        let row = |_: &mut (), k: usize, out: &mut Vec<(u32, f32)>| {
+            let i = vertices[k] as usize;
+            out.extend(self.row(i).0.iter().copied().zip(values(k, i).iter().copied()));
+        };
+        Weights::from_rows(vertices.len(), self.locked.len() as u32, || (), row)
     }
 
     fn range(&self, i: usize) -> std::ops::Range<usize> {

@@ -96,9 +96,9 @@ impl<const N: usize> SimplexQp<N> {
     fn best_release(&self, face: &Face<N>, multiplier: f64, w: &[f64; N]) -> Option<usize> {
         let trace: f64 = (0..N).map(|i| self.h[i][i]).sum();
         let (mut lowest, mut found) = (-MULTIPLIER_TOLERANCE * trace, None);
-        for j in 0..N {
-            let slope: f64 = self.h[j].iter().zip(w).map(|(h, w)| h * w).sum();
-            let bound_multiplier = slope - self.g[j] + multiplier;
+        for (j, (row, g)) in self.h.iter().zip(self.g).enumerate() {
+            let slope: f64 = row.iter().zip(w).map(|(h, w)| h * w).sum();
+            let bound_multiplier = slope - g + multiplier;
             if bound_multiplier < lowest && j < self.n && !face[j] {
                 (lowest, found) = (bound_multiplier, Some(j));
             }

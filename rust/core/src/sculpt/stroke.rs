@@ -43,7 +43,8 @@ impl SculptSolver {
         let before = self.residuals_to(pose, vertices, &targets);
         let goals = targets.iter().map(|&t| Some(t)).collect();
         let old_targets = self.exchange_targets(pose, vertices, goals);
-        let solved: Vec<_> = vertices.par_iter().with_min_len(64).map(|&i| self.solve_vertex(i as usize)).collect();
+        let solve = |&i: &u32| self.solve_vertex(i as usize, self.rest[i as usize], self.row(i as usize).1);
+        let solved: Vec<_> = vertices.par_iter().with_min_len(64).map(solve).collect();
         let rows = vertices.iter().zip(&solved);
         let values = rows.flat_map(|(&i, row)| &row[..self.range(i as usize).len()]).copied().collect();
         let old_values = self.exchange_values(vertices, values);

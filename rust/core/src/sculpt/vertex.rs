@@ -39,7 +39,7 @@ impl Guards {
             let target =
                 crate::skinning::blended_transform(bones, values, pose_from_rest).transform_point3(solver.rest[i]);
             let mut offsets = [DVec3::ZERO; MAX_MEMBERS];
-            solver.offsets(i, pose_from_rest, target, &mut offsets);
+            solver.offsets(i, solver.rest[i], pose_from_rest, target, &mut offsets);
             let pairs = (0..bones.len()).flat_map(|a| (0..=a).map(move |b| (a, b)));
             for (entry, (a, b)) in triangle.iter_mut().zip(pairs) {
                 *entry += alpha * offsets[a].dot(offsets[b]);
@@ -58,30 +58,34 @@ fn packed_length(n: usize) -> usize {
 
 impl SculptSolver {
     /// E of one pose: where each member alone would take vertex `i`, from `target`, in rest diagonals.
-    fn offsets(&self, i: usize, pose_from_rest: &[DAffine3], target: DVec3, offsets: &mut [DVec3]) {
+    fn offsets(&self, i: usize, rest: DVec3, pose_from_rest: &[DAffine3], target: DVec3, offsets: &mut [DVec3]) {
         for (offset, &bone) in offsets.iter_mut().zip(&self.bones[self.range(i)]) {
-            *offset = (pose_from_rest[bone as usize].transform_point3(self.rest[i]) - target) / self.diagonal;
+            *offset = (pose_from_rest[bone as usize].transform_point3(rest) - target) / self.diagonal;
         }
     }
 
-    /// The weights of vertex `i` that best meet its targets and guards, in the order of its members.
-    pub(super) fn solve_vertex(&self, i: usize) -> [f32; MAX_MEMBERS] {
-        if self.range(i).len() <= 4 { self.solve_members::<4>(i) } else { self.solve_members::<MAX_MEMBERS>(i) }
+    /// The weights of vertex `i`, in the order of its members, that best meet its targets and guards when it rests at
+    /// `rest` and had the weights `values` before.
+    pub(super) fn solve_vertex(&self, i: usize, rest: DVec3, values: &[f32]) -> [f32; MAX_MEMBERS] {
+        if values.len() <= 4 {
+            self.solve_members::<4>(i, rest, values)
+        } else {
+            self.solve_members::<MAX_MEMBERS>(i, rest, values)
+        }
     }
 
-    fn solve_members<const N: usize>(&self, i: usize) -> [f32; MAX_MEMBERS] {
-        let (bones, values) = self.row(i);
+    fn solve_members<const N: usize>(&self, i: usize, rest: DVec3, values: &[f32]) -> [f32; MAX_MEMBERS] {
         let mut solved = [0.0; MAX_MEMBERS];
         solved[..values.len()].copy_from_slice(values);
         let total: f64 = values.iter().map(|&x| f64::from(x)).sum();
-        let members = FreeFirst::<N>::of(bones, &self.locked);
+        let members = FreeFirst::<N>::of(self.row(i).0, &self.locked);
         let mut w = members.order.map(|a| values.get(a).map_or(0.0, |&x| f64::from(x) / total));
         let mass: f64 = w[..members.free].iter().sum();
         // An unweighted vertex is not skinned, and has no feasible weights to start from.
         if total <= LEAST_TOTAL_WEIGHT || mass <= 0.0 {
             return solved;
         }
-        let h = self.quadratic(i, &members);
+        let h = self.quadratic(i, rest, &members);
         self.minimise(h, &members, mass, &mut w);
         // A row that holds a locked weight keeps its sum, or the locked share would change.
         let sum = if members.free < members.len { total } else { 1.0 };
@@ -92,7 +96,7 @@ impl SculptSolver {
     }
 
     /// H = sum of alpha E'E over targets and guards, members free ones first.
-    fn quadratic<const N: usize>(&self, i: usize, members: &FreeFirst<N>) -> [[f64; N]; N] {
+    fn quadratic<const N: usize>(&self, i: usize, rest: DVec3, members: &FreeFirst<N>) -> [[f64; N]; N] {
         let order = &members.order;
         let held = |a: usize, b: usize| self.guards.entry(i, order[a], order[b]);
         let is_member = |a: usize| a < members.len;
@@ -102,7 +106,7 @@ impl SculptSolver {
         for target in &self.targets[i] {
             let pose = &self.poses[target.pose];
             let mut offsets = [DVec3::ZERO; N];
-            self.offsets(i, &pose.pose_from_rest, target.position, &mut offsets);
+            self.offsets(i, rest, &pose.pose_from_rest, target.position, &mut offsets);
             let e = order.map(|a| offsets[a]);
             for (row, e_a) in h.iter_mut().zip(e) {
                 row.iter_mut().zip(e).for_each(|(entry, e_b)| *entry += pose.alpha * e_a.dot(e_b));

@@ -1,0 +1,70 @@
+"""The panel of sculpting weights: begin, what is going on, settings."""
+
+import bpy
+from bpy.types import Context, Panel, UILayout
+
+from .. import sculpt_session
+from ..sculpt_session import SculptSession
+from .panel import Tab
+
+
+class SKINWRIGHT_PT_sculpt(Tab, Panel):
+    """One button, and while it runs what the last stroke did."""
+
+    bl_label = "Sculpt Weights"
+    bl_order = 3
+
+    def draw(self, context: Context) -> None:
+        """While sculpting, the ways to end it."""
+        layout = self.layout
+        settings = context.scene.skinwright.sculpt
+        if sculpt_session.current:
+            _draw_state(layout, sculpt_session.current)
+        else:
+            layout.operator("skinwright.sculpt_weights", icon="SCULPTMODE_HLT")
+            layout.operator("skinwright.desparsify", icon="GROUP_VERTEX")
+        layout.prop(settings, "kappa", slider=True)
+        overlay = context.scene.skinwright.overlay
+        shown = overlay.kind == "INFLUENCES"
+        button = layout.operator("wm.context_set_enum", text="Show Influence Counts", icon="OVERLAY", depress=shown)
+        button.data_path, button.value = "scene.skinwright.overlay.kind", "NONE" if shown else "INFLUENCES"
+
+
+def _draw_state(layout: UILayout, session: SculptSession) -> None:
+    row = layout.row(align=True)
+    row.operator("skinwright.end_sculpt_weights", text="Keep", icon="CHECKMARK").keep = True
+    row.operator("skinwright.end_sculpt_weights", text="Cancel", icon="X").keep = False
+    column = layout.column(align=True)
+    column.label(text=f"{session.target_name}: {session.stroke_count} strokes, {session.pose_count} poses")
+    if session.reachability is not None:
+        column.progress(factor=max(session.reachability, 0), text=f"{session.reachability:.0%} reached")
+
+
+class SKINWRIGHT_PT_sculpt_settings(Tab, Panel):
+    """What is settled when sculpting begins."""
+
+    bl_label = "Settings"
+    bl_parent_id = "SKINWRIGHT_PT_sculpt"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        """Not to be changed on the way."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.layout.active = sculpt_session.current is None
+        context.scene.skinwright.sculpt.draw_settings(self.layout.column())
+
+
+CLASSES = (SKINWRIGHT_PT_sculpt, SKINWRIGHT_PT_sculpt_settings)
+
+
+def register() -> None:
+    """Register the panels, parents first."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Unregister them, children first."""
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
