@@ -1,4 +1,4 @@
-"""The overlay's legend and histograms, at the bottom left of the view."""
+"""The overlay's legend and histograms, at the left of the view, under the view's own text and over the redo panel."""
 
 import blf
 import bpy
@@ -15,6 +15,7 @@ TITLES = {"MATCH": "Match", "INFLUENCES": "Influences", "STRETCH": "Stretch"}
 TEXT = (0.95, 0.95, 0.95, 1.0)
 BACKGROUND = (0.08, 0.08, 0.08, 0.72)
 BARS_BELOW, BARS_ABOVE = (*colours.CATEGORIES[Category.MATCHED], 1.0), (*colours.CATEGORIES[Category.INPAINTED], 1.0)
+LEFT, BELOW_TOP = 70, 125
 LINE = 18
 WIDTH = 230
 HISTOGRAM_HEIGHT = 54
@@ -23,9 +24,10 @@ HISTOGRAM_HEIGHT = 54
 class _Sheet:
     """Draws in pixels at the interface's scale, from the bottom left of the legend."""
 
-    def __init__(self) -> None:
+    def __init__(self, height: float) -> None:
         self.scale = bpy.context.preferences.system.ui_scale
-        self.left, self.bottom = 70 * self.scale, 30 * self.scale
+        self.left = LEFT * self.scale
+        self.bottom = bpy.context.region.height - (BELOW_TOP + height) * self.scale
         self.shader = gpu.shader.from_builtin("UNIFORM_COLOR")
 
     def rectangles(self, boxes: ArrayLike, colour: tuple[float, ...]) -> None:
@@ -49,8 +51,8 @@ class _Sheet:
 
 def draw(picture: Picture) -> None:
     """Rows of colours with counts, then histograms with their thresholds."""
-    sheet = _Sheet()
     height = LINE * (len(picture.rows) + 1 + bool(picture.note)) + (HISTOGRAM_HEIGHT + LINE) * len(picture.histograms)
+    sheet = _Sheet(height)
     gpu.state.blend_set("ALPHA")
     sheet.rectangles([(-8, -8, WIDTH + 16, height + 14)], BACKGROUND)
     y = 0.0

@@ -57,15 +57,28 @@ def steps(window: Window) -> Steps:
     look(window)
     yield 0.3
     with window.context():
+        bpy.ops.ed.undo_push(message="Scene")
         assert bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT", True) == {"FINISHED"}
+    assert most_influences() > 1
     yield 0.5
-    window.key("F9")
-    yield from window.screenshot("redo_panel")
-    window.key("ESC")
+    with window.context():
+        bpy.context.window_manager.operators[-1].properties.max_influences = 1
+        bpy.ops.ed.undo_redo()
+    yield 0.5
+    assert most_influences() == 1, "changing the redo panel did not repeat the transfer"
+    window.event("MOUSEMOVE")
     yield 0.2
+    with window.context():
+        bpy.ops.screen.redo_last("INVOKE_DEFAULT")
+    yield from window.screenshot("redo_panel")
+    garment = bpy.data.objects["Dress"]
     with window.context():
         bpy.ops.skinwright.check_weights("INVOKE_DEFAULT", True)
     record["selected"] = sum(vertex.select for vertex in garment.data.vertices)
+
+
+def most_influences() -> int:
+    return max(map(len, dress.weights("Dress")))
 
 
 start(steps)
