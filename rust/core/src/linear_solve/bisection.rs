@@ -30,9 +30,9 @@ impl Plane {
     }
 }
 
-/// Puts the lower half of `points` along `axis` first.
-pub(super) fn halve(points: &mut [Point], axis: Vec3) -> Plane {
-    let origin = points[0].position;
+/// Puts the lower half of `points` along `axis` first. The same half only from the same `origin`: another one rounds
+/// otherwise, and points that lie in one plane change sides.
+pub(super) fn halve(points: &mut [Point], axis: Vec3, origin: Vec3) -> Plane {
     for point in points.iter_mut() {
         point.key = axis.dot(point.position - origin);
     }

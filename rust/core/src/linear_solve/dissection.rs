@@ -136,13 +136,13 @@ impl Cutter<'_> {
 
     /// Moves the points into the order (below, above, separator) and returns the first two's sizes.
     fn cut(&self, points: &mut [Point]) -> (usize, usize) {
-        let axes = principal_axes(points);
+        let (axes, origin) = (principal_axes(points), points[0].position);
         let tried = if points.len() > TRY_AXES { axes.len() } else { 1 };
-        let plane = halve(points, axes[0]);
+        let plane = halve(points, axes[0], origin);
         let mut best = self.separator(points, plane);
         let (mut chosen, mut last) = (0, 0);
         for (axis, &direction) in axes.iter().enumerate().take(tried).skip(1) {
-            let plane = halve(points, direction);
+            let plane = halve(points, direction, origin);
             let separator = self.separator(points, plane);
             last = axis;
             if separator.len() < best.len() {
@@ -150,7 +150,7 @@ impl Cutter<'_> {
             }
         }
         if chosen != last {
-            halve(points, axes[chosen]);
+            halve(points, axes[chosen], origin);
         }
         for &unknown in &best {
             self.set_place(unknown, SEPARATOR);

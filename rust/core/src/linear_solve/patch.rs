@@ -43,7 +43,7 @@ impl Patch {
         if points.len() <= LEAF {
             return self.finish(points, 0, nodes);
         }
-        halve(points, principal_axes(points)[0]);
+        halve(points, principal_axes(points)[0], points[0].position);
         let middle = points.len() / 2;
         let (below, above) = (set_of(&points[..middle]), set_of(&points[middle..]));
         let touches = |point: &Point, other: &Set| intersects(&self.neighbours[point.unknown as usize], other);
