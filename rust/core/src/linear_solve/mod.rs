@@ -91,6 +91,9 @@ impl Method {
     pub const ALL: [Self; 2] = [Self::Multifrontal, Self::Supernodal];
 }
 
+/// Matrices smaller than this are ordered so fast by minimum degree that fronts do not pay.
+const FEW: usize = 300;
+
 /// A Cholesky factorisation, kept for as many solves as wanted.
 #[derive(Debug)]
 pub struct Cholesky {
@@ -111,7 +114,8 @@ impl Cholesky {
     /// # Errors
     /// [`NotPositive`] with the offending unknown.
     pub fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
-        Self::factor_with(Method::Multifrontal, matrix, positions)
+        let method = if matrix.size() < FEW { Method::Supernodal } else { Method::Multifrontal };
+        Self::factor_with(method, matrix, positions)
     }
 
     /// The same with a method of choice. Where separators turn out large, `Multifrontal` gives way to `Supernodal`.
