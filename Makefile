@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python check bench extension clean
+.PHONY: help demo test test-rust test-python check bench sculpt-eval extension clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -74,6 +74,10 @@ check: .venv/tests.stamp cargo
 SIZES := 5k,20k,100k,300k,1M
 bench: .venv/bench.stamp
 	.venv/bin/python bench/run.py --sizes $(SIZES)
+
+## make sculpt-eval  how well sculpts become weights, against quadprog and Dem Bones: bench/sculpt_results.md and .png
+sculpt-eval: .venv/bench.stamp $(BODY)
+	.venv/bin/python bench/sculpt_eval.py --body $(BODY)
 
 ## make extension  the zip that Blender installs, in dist/
 extension: .venv/native.stamp
