@@ -3,7 +3,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::super::blocks::BLOCK;
-use super::{divide, pivot_block, product};
+use super::{divide, pivot_block, product, vector_place};
 
 /// Factors the block columns `first..last` of the row blocks `rows` of a panel, earlier ones being subtracted already.
 /// `pivots` are the panel's row blocks before them, complete up to `last`.
@@ -30,19 +30,15 @@ impl WithSimd for Eliminate<'_, '_, '_> {
                 let before = pivot_row[BLOCK * BLOCK * first..start].as_chunks().0;
                 match rows {
                     [r0, r1, r2] if S::F64_LANES == BLOCK => {
-                        eliminate_tile::<S, 3>(
-                            simd,
-                            [r0, r1, r2].map(|row| &mut row[skip..]),
-                            0,
-                            before,
-                            &pivot,
-                            width,
-                        );
+                        let rows = [r0, r1, r2].map(|row| &mut row[skip..]);
+                        eliminate_tile::<S, 3, 3, BLOCK>(simd, rows, before, &pivot, width);
                     }
                     _ => {
-                        for row in rows.iter_mut() {
-                            for part in 0..(BLOCK / S::F64_LANES) {
-                                eliminate_tile::<S, 1>(simd, [&mut row[skip..]], part, before, &pivot, width);
+                        for row in rows.iter_mut().map(|row| [&mut row[skip..]]) {
+                            if S::F64_LANES == BLOCK {
+                                eliminate_tile::<S, 1, 1, BLOCK>(simd, row, before, &pivot, width);
+                            } else {
+                                eliminate_tile::<S, 1, 2, 4>(simd, row, before, &pivot, width);
                             }
                         }
                     }
@@ -53,37 +49,37 @@ impl WithSimd for Eliminate<'_, '_, '_> {
     }
 }
 
+/// Eliminates one block column in `R` row blocks, `V` vectors at a time.
 #[inline(always)]
-fn eliminate_tile<S: Simd, const V: usize>(
+fn eliminate_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
     simd: S,
-    rows: [&mut [f64]; V],
-    part: usize,
+    rows: [&mut [f64]; R],
     before: &[[f64; BLOCK]],
     pivots: &[f64; BLOCK * BLOCK],
     width: usize,
 ) {
     let stride = BLOCK / S::F64_LANES;
-    let start = BLOCK * before.len();
-    let mut done: [&[S::f64s]; V] = [&[]; V];
-    let mut now: [&mut [S::f64s]; V] = std::array::from_fn(|_| &mut [][..]);
-    for (v, row) in rows.into_iter().enumerate() {
-        let (left, right) = row.split_at_mut(start);
-        done[v] = &S::as_simd_f64s(left).0[part.min(left.len())..];
-        now[v] = &mut S::as_mut_simd_f64s(&mut right[..BLOCK * width]).0[part..];
-    }
-    let sum = product::<S, V, BLOCK>(simd, done, stride, before, 0);
-    let mut x = [[simd.splat_f64s(0.0); BLOCK]; V];
-    for v in 0..V {
-        for c in 0..BLOCK {
-            let old = if c < width { now[v][c * stride] } else { simd.splat_f64s(0.0) };
-            x[v][c] = simd.sub_f64s(old, sum[v][c]);
+    let start = stride * before.len();
+    for group in 0..R * stride / V {
+        let place: [(usize, usize); V] = std::array::from_fn(|v| vector_place::<S>(V * group + v));
+        let mut x = {
+            let done = place.map(|(row, part)| &S::as_simd_f64s(&rows[row]).0[part..]);
+            product::<S, V, C>(simd, done, stride, before)
+        };
+        for v in 0..V {
+            let (row, part) = place[v];
+            let now = &S::as_simd_f64s(&rows[row]).0[start..];
+            for c in 0..BLOCK {
+                let old = if c < width { now[c * stride + part] } else { simd.splat_f64s(0.0) };
+                x[v][c] = simd.sub_f64s(old, x[v][c]);
+            }
         }
-    }
-    divide(simd, &mut x, pivots);
-    for v in 0..V {
-        for c in 0..BLOCK {
-            if c < width {
-                now[v][c * stride] = x[v][c];
+        divide(simd, &mut x, pivots);
+        for v in 0..V {
+            let (row, part) = place[v];
+            let now = &mut S::as_mut_simd_f64s(&mut *rows[row]).0[start..];
+            for c in 0..width {
+                now[c * stride + part] = x[v][c];
             }
         }
     }
@@ -106,7 +102,7 @@ impl WithSimd for Pivot<'_> {
         let mut block = pivot_block(now);
         for part in 0..stride {
             let vectors = &S::as_simd_f64s(done).0[part.min(done.len())..];
-            let [sum] = product::<S, 1, BLOCK>(simd, [vectors], stride, done.as_chunks().0, 0);
+            let [sum] = product::<S, 1, BLOCK>(simd, [vectors], stride, done.as_chunks().0);
             let block = S::as_mut_simd_f64s(&mut block).0;
             for c in 0..BLOCK {
                 block[c * stride + part] = simd.sub_f64s(block[c * stride + part], sum[c]);

@@ -1,6 +1,7 @@
 //! Dense arithmetic on row blocks (see `blocks`), compiled for AVX-512, AVX2 with FMA and plain code, chosen at run time.
 //!
-//! Everything is a sum of products of eight-wide streams held in registers: with 32 registers 24 vectors at a time, else 8.
+//! Everything is a sum of products of eight-wide streams held in registers: with 32 registers three vectors by eight
+//! columns at a time, with 16 two by four (three by four spill; one by four wait for each other, at half the speed).
 //! Each sum runs in one fixed order, so how rows are shared out among threads never shows in the bits.
 
 // Indices are constants after unrolling, which is what keeps the sums in registers; iterators over them did not.
@@ -23,9 +24,34 @@ use super::blocks::BLOCK;
 /// Row blocks of the factor seen as one operand of a product.
 pub(super) type RowBlocks<'a> = &'a [&'a [f64]];
 
-/// Sums over p of `a[v][p * stride] * b[p][first + c]`.
+/// Sums over p of `a[v][p * stride] * b[p][c]` for all columns, `C` at a time.
 #[inline(always)]
 fn product<S: Simd, const V: usize, const C: usize>(
+    simd: S,
+    a: [&[S::f64s]; V],
+    stride: usize,
+    b: &[[f64; BLOCK]],
+) -> [[S::f64s; BLOCK]; V] {
+    let low = product_of_columns::<S, V, C>(simd, a, stride, b, 0);
+    let high = if C < BLOCK { product_of_columns::<S, V, C>(simd, a, stride, b, C) } else { low };
+    eight_columns(&low, &high)
+}
+
+/// The first `C` (four or eight) columns and the rest.
+#[inline(always)]
+fn eight_columns<T: Copy, const V: usize, const C: usize>(low: &[[T; C]; V], high: &[[T; C]; V]) -> [[T; BLOCK]; V] {
+    let mut all = [[low[0][0]; BLOCK]; V];
+    for v in 0..V {
+        for c in 0..BLOCK {
+            all[v][c] = if c < C { low[v][c] } else { high[v][c - C] };
+        }
+    }
+    all
+}
+
+/// The same for the columns from `first` on.
+#[inline(always)]
+fn product_of_columns<S: Simd, const V: usize, const C: usize>(
     simd: S,
     a: [&[S::f64s]; V],
     stride: usize,
@@ -34,7 +60,7 @@ fn product<S: Simd, const V: usize, const C: usize>(
 ) -> [[S::f64s; C]; V] {
     let mut sum = [[simd.splat_f64s(0.0); C]; V];
     for (p, b) in b.iter().enumerate() {
-        let b: &[f64; C] = b[first..].first_chunk().expect("first is 0, or 4 with C = 4");
+        let b: &[f64; C] = b[first..].first_chunk().expect("first is a multiple of C");
         let a: [S::f64s; V] = std::array::from_fn(|v| a[v][p * stride]);
         for c in 0..C {
             let factor = simd.splat_f64s(b[c]);
@@ -44,6 +70,12 @@ fn product<S: Simd, const V: usize, const C: usize>(
         }
     }
     sum
+}
+
+/// Row block in which vector `v` of neighbouring row blocks lies, and its place there.
+fn vector_place<S: Simd>(v: usize) -> (usize, usize) {
+    let stride = BLOCK / S::F64_LANES;
+    (v / stride, v % stride)
 }
 
 /// A block of a panel's triangle on the diagonal, padded to eight columns; pivots are stored inverted.

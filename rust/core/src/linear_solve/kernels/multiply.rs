@@ -5,7 +5,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::super::blocks::BLOCK;
-use super::{RowBlocks, product};
+use super::{RowBlocks, product, vector_place};
 
 /// Columns that a product sums up before it stores, and row blocks it keeps at hand meanwhile: half a megabyte.
 const DEPTH: usize = 256;
@@ -56,17 +56,20 @@ fn trapezoid<S: Simd>(
     for (j, b) in b.iter().enumerate() {
         let (b, column) = (b[depth.clone()].as_chunks().0, column + j);
         match (a, &mut *target) {
-            ([a0, a1, a2], [t0, t1, t2]) if S::F64_LANES == BLOCK && column <= row => {
-                let a = [a0, a1, a2].map(|a| S::as_simd_f64s(&a[depth.clone()]).0);
-                let sum = product::<S, 3, BLOCK>(simd, a, 1, b, 0);
-                subtract(simd, block_mut(t0, column), 0, 0, &sum[0], overwrite);
-                subtract(simd, block_mut(t1, column), 0, 0, &sum[1], overwrite);
-                subtract(simd, block_mut(t2, column), 0, 0, &sum[2], overwrite);
+            (&[a0, a1, a2], [t0, t1, t2]) if S::F64_LANES == BLOCK && column <= row => {
+                let a = [a0, a1, a2].map(|a| &a[depth.clone()]);
+                let target = [t0, t1, t2].map(|target| block_mut(target, column));
+                subtract_tile::<S, 3, 3, BLOCK>(simd, target, a, b, overwrite);
             }
             (a, target) => {
                 for (i, (a, target)) in a.iter().zip(target).enumerate() {
                     if column <= row + i {
-                        subtract_block(simd, block_mut(target, column), &a[depth.clone()], b, overwrite);
+                        let (a, target) = ([&a[depth.clone()]], [block_mut(target, column)]);
+                        if S::F64_LANES == BLOCK {
+                            subtract_tile::<S, 1, 1, BLOCK>(simd, target, a, b, overwrite);
+                        } else {
+                            subtract_tile::<S, 1, 2, 4>(simd, target, a, b, overwrite);
+                        }
                     }
                 }
             }
@@ -81,39 +84,29 @@ fn block_mut(row: &mut [f64], column: usize) -> &mut [f64] {
     &mut row[..len]
 }
 
+/// Subtracts the product of `a` and `b` from a block of each of `R` row blocks (or stores its negative), `V` vectors and
+/// `C` columns at a time.
 #[inline(always)]
-fn subtract_block<S: Simd>(simd: S, target: &mut [f64], a: &[f64], b: &[[f64; BLOCK]], overwrite: bool) {
-    let stride = BLOCK / S::F64_LANES;
-    let a = S::as_simd_f64s(a).0;
-    for part in 0..stride {
-        let a = &a[part.min(a.len())..];
-        if S::F64_LANES == BLOCK {
-            let [sum] = product::<S, 1, BLOCK>(simd, [a], stride, b, 0);
-            subtract(simd, target, part, 0, &sum, overwrite);
-        } else {
-            for first in [0, 4] {
-                let [sum] = product::<S, 1, 4>(simd, [a], stride, b, first);
-                subtract(simd, target, part, first, &sum, overwrite);
-            }
-        }
-    }
-}
-
-/// Subtracts `sum` from, or stores its negative into, the columns `first..` of a block.
-#[inline(always)]
-fn subtract<S: Simd, const C: usize>(
+fn subtract_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
     simd: S,
-    block: &mut [f64],
-    part: usize,
-    first: usize,
-    sum: &[S::f64s; C],
+    target: [&mut [f64]; R],
+    a: [&[f64]; R],
+    b: &[[f64; BLOCK]],
     overwrite: bool,
 ) {
     let stride = BLOCK / S::F64_LANES;
-    let block = S::as_mut_simd_f64s(block).0;
-    for c in 0..C {
-        if let Some(target) = block.get_mut((first + c) * stride + part) {
-            *target = simd.sub_f64s(if overwrite { simd.splat_f64s(0.0) } else { *target }, sum[c]);
+    for group in 0..R * stride / V {
+        let place: [(usize, usize); V] = std::array::from_fn(|v| vector_place::<S>(V * group + v));
+        let a = place.map(|(row, part)| S::as_simd_f64s(a[row]).0.get(part..).unwrap_or_default());
+        let sum = product::<S, V, C>(simd, a, stride, b);
+        for v in 0..V {
+            let (row, part) = place[v];
+            let target = S::as_mut_simd_f64s(target[row]).0;
+            for c in 0..BLOCK {
+                if let Some(target) = target.get_mut(c * stride + part) {
+                    *target = simd.sub_f64s(if overwrite { simd.splat_f64s(0.0) } else { *target }, sum[v][c]);
+                }
+            }
         }
     }
 }

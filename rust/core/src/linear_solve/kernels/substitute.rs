@@ -3,7 +3,31 @@
 use pulp::{Simd, WithSimd};
 
 use super::super::blocks::BLOCK;
-use super::{RowBlocks, divide, pivot_block, product};
+use super::{RowBlocks, divide, eight_columns, pivot_block, product};
+
+/// What a kernel does to `V` neighbouring vectors of right-hand sides from `at` on, with sums for `C` rows at a time.
+trait Strip {
+    fn strip<const V: usize, const C: usize>(&mut self, at: usize);
+}
+
+/// Goes through a row of right-hand sides, `stride` vectors long, in strips as wide as the registers hold sums for.
+#[inline(always)]
+fn for_each_strip<S: Simd>(stride: usize, mut kernel: impl Strip) {
+    let mut at = 0;
+    // A width is a multiple of eight, so that no narrow vector is left alone.
+    while S::F64_LANES < BLOCK && at < stride {
+        kernel.strip::<2, 4>(at);
+        at += 2;
+    }
+    while at + 3 <= stride {
+        kernel.strip::<3, BLOCK>(at);
+        at += 3;
+    }
+    while at < stride {
+        kernel.strip::<1, BLOCK>(at);
+        at += 1;
+    }
+}
 
 /// Solves `triangle * y = y` in place for the triangle with these row blocks, `y` (columns, width).
 pub(in super::super) struct Forward<'a> {
@@ -25,34 +49,30 @@ impl WithSimd for Forward<'_> {
             let (done, now) = y.split_at_mut(BLOCK * block * width);
             let done = S::as_simd_f64s(done).0;
             let now = S::as_mut_simd_f64s(&mut now[..(row.len() / BLOCK - BLOCK * block) * width]).0;
-            let mut at = 0;
-            while S::F64_LANES == BLOCK && at + 3 <= stride {
-                forward_tile::<S, 3>(simd, done, now, stride, at, before, &pivots);
-                at += 3;
-            }
-            while at < stride {
-                forward_tile::<S, 1>(simd, done, now, stride, at, before, &pivots);
-                at += 1;
-            }
+            for_each_strip::<S>(stride, ForwardStrip { simd, done, now, stride, before, pivots: &pivots });
         }
     }
 }
 
-#[inline(always)]
-fn forward_tile<S: Simd, const V: usize>(
+struct ForwardStrip<'a, S: Simd> {
     simd: S,
-    done: &[S::f64s],
-    now: &mut [S::f64s],
+    done: &'a [S::f64s],
+    now: &'a mut [S::f64s],
     stride: usize,
-    at: usize,
-    before: &[[f64; BLOCK]],
-    pivots: &[f64; BLOCK * BLOCK],
-) {
-    let a: [&[S::f64s]; V] = std::array::from_fn(|v| &done[(at + v).min(done.len())..]);
-    let sum = product::<S, V, BLOCK>(simd, a, stride, before, 0);
-    let mut x = subtract_from::<S, V>(simd, now, stride, at, &sum);
-    divide(simd, &mut x, pivots);
-    store::<S, V>(now, stride, at, &x);
+    before: &'a [[f64; BLOCK]],
+    pivots: &'a [f64; BLOCK * BLOCK],
+}
+
+impl<S: Simd> Strip for ForwardStrip<'_, S> {
+    #[inline(always)]
+    fn strip<const V: usize, const C: usize>(&mut self, at: usize) {
+        let Self { simd, done, stride, before, pivots, .. } = *self;
+        let done: [&[S::f64s]; V] = std::array::from_fn(|v| &done[(at + v).min(done.len())..]);
+        let sum = product::<S, V, C>(simd, done, stride, before);
+        let mut x = subtract_from::<S, V>(simd, self.now, stride, at, &sum);
+        divide(simd, &mut x, pivots);
+        store::<S, V>(self.now, stride, at, &x);
+    }
 }
 
 /// Up to eight rows of `target` minus `sum`; rows that are not there count as zero. (Indices are constants everywhere, or
@@ -108,56 +128,29 @@ impl WithSimd for Apply<'_> {
         for (row, target) in rows.iter().zip(target.chunks_mut(BLOCK * width)) {
             let row = row[..BLOCK * depth].as_chunks().0;
             let target = S::as_mut_simd_f64s(target).0;
-            let mut at = 0;
-            while at + 3 <= stride {
-                apply_tile::<S, 3>(simd, y, target, stride, at, row, overwrite);
-                at += 3;
-            }
-            while at < stride {
-                apply_tile::<S, 1>(simd, y, target, stride, at, row, overwrite);
-                at += 1;
-            }
+            for_each_strip::<S>(stride, ApplyStrip { simd, row, y, target, stride, overwrite });
         }
     }
 }
 
-#[inline(always)]
-fn apply_tile<S: Simd, const V: usize>(
+struct ApplyStrip<'a, S: Simd> {
     simd: S,
-    y: &[S::f64s],
-    target: &mut [S::f64s],
+    row: &'a [[f64; BLOCK]],
+    y: &'a [S::f64s],
+    target: &'a mut [S::f64s],
     stride: usize,
-    at: usize,
-    row: &[[f64; BLOCK]],
     overwrite: bool,
-) {
-    let a: [&[S::f64s]; V] = std::array::from_fn(|v| &y[(at + v).min(y.len())..]);
-    if S::F64_LANES == BLOCK {
-        let sum = product::<S, V, BLOCK>(simd, a, stride, row, 0);
-        subtract_rows(simd, target, stride, at, 0, sum, overwrite);
-    } else {
-        for first in [0, 4] {
-            let sum = product::<S, V, 4>(simd, a, stride, row, first);
-            subtract_rows(simd, target, stride, at, first, sum, overwrite);
-        }
-    }
 }
 
-#[inline(always)]
-fn subtract_rows<S: Simd, const V: usize, const C: usize>(
-    simd: S,
-    target: &mut [S::f64s],
-    stride: usize,
-    at: usize,
-    first: usize,
-    sum: [[S::f64s; C]; V],
-    overwrite: bool,
-) {
-    for (c, row) in target.chunks_exact_mut(stride).skip(first).take(C).enumerate() {
-        for v in 0..V {
-            let old = if overwrite { simd.splat_f64s(0.0) } else { row[at + v] };
-            row[at + v] = simd.sub_f64s(old, sum[v][c]);
-        }
+impl<S: Simd> Strip for ApplyStrip<'_, S> {
+    #[inline(always)]
+    fn strip<const V: usize, const C: usize>(&mut self, at: usize) {
+        let Self { simd, row, y, stride, overwrite, .. } = *self;
+        let y: [&[S::f64s]; V] = std::array::from_fn(|v| &y[(at + v).min(y.len())..]);
+        let sum = product::<S, V, C>(simd, y, stride, row);
+        let old = if overwrite { &[] } else { &*self.target };
+        let x = subtract_from::<S, V>(simd, old, stride, at, &sum);
+        store::<S, V>(self.target, stride, at, &x);
     }
 }
 
@@ -177,76 +170,68 @@ impl WithSimd for Backward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let stride = self.width / S::F64_LANES;
-        let mut at = 0;
-        let Self { rows, x, block, y, width: _, pivots } = self;
+        let Self { rows, x, block, y, width, pivots } = self;
         let pivots = pivots.map(pivot_block);
         let (x, y) = (S::as_simd_f64s(x).0, S::as_mut_simd_f64s(y).0);
-        while S::F64_LANES == BLOCK && at + 3 <= stride {
-            backward_tile::<S, 3>(simd, rows, x, block, y, stride, at, pivots.as_ref());
-            at += 3;
-        }
-        while at < stride {
-            backward_tile::<S, 1>(simd, rows, x, block, y, stride, at, pivots.as_ref());
-            at += 1;
-        }
+        let stride = width / S::F64_LANES;
+        for_each_strip::<S>(stride, BackwardStrip { simd, rows, x, block, y, stride, pivots: pivots.as_ref() });
     }
 }
 
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn backward_tile<S: Simd, const V: usize>(
+struct BackwardStrip<'a, S: Simd> {
     simd: S,
-    rows: RowBlocks,
-    x: &[S::f64s],
+    rows: RowBlocks<'a>,
+    x: &'a [S::f64s],
     block: usize,
-    y: &mut [S::f64s],
+    y: &'a mut [S::f64s],
     stride: usize,
-    at: usize,
-    pivots: Option<&[f64; BLOCK * BLOCK]>,
-) {
-    let sum = transposed_product::<S, V>(simd, rows, x, block, y.len() / stride, stride, at);
-    let mut sum = subtract_from::<S, V>(simd, y, stride, at, &sum);
-    if let Some(pivots) = pivots {
-        divide_transposed(simd, &mut sum, pivots);
-    }
-    store::<S, V>(y, stride, at, &sum);
+    pivots: Option<&'a [f64; BLOCK * BLOCK]>,
 }
 
-/// Sums over i of `rows[i][block column c] * x[i][at + v]`, for the first `columns` columns of the block.
-#[inline(always)]
-fn transposed_product<S: Simd, const V: usize>(
-    simd: S,
-    rows: RowBlocks,
-    x: &[S::f64s],
-    block: usize,
-    columns: usize,
-    stride: usize,
-    at: usize,
-) -> [[S::f64s; BLOCK]; V] {
-    let start = BLOCK * BLOCK * block;
-    let mut sum = [[simd.splat_f64s(0.0); BLOCK]; V];
-    for (row, x) in rows.iter().zip(x.chunks(BLOCK * stride)) {
-        let stored = &row[start..start + BLOCK * columns];
-        let padded;
-        let entries: &[f64; BLOCK * BLOCK] = match stored.first_chunk() {
-            Some(entries) => entries,
-            None => {
-                padded = pivot_block(stored);
-                &padded
-            }
-        };
-        for (r, x) in x.chunks_exact(stride).enumerate() {
-            let x: [S::f64s; V] = std::array::from_fn(|v| x[at + v]);
-            for c in 0..BLOCK {
-                let factor = simd.splat_f64s(entries[BLOCK * c + (r % BLOCK)]);
-                for v in 0..V {
-                    sum[v][c] = simd.mul_add_e_f64s(x[v], factor, sum[v][c]);
+impl<S: Simd> Strip for BackwardStrip<'_, S> {
+    #[inline(always)]
+    fn strip<const V: usize, const C: usize>(&mut self, at: usize) {
+        let low = self.transposed_product::<V, C>(at, 0);
+        let high = if C < BLOCK { self.transposed_product::<V, C>(at, C) } else { low };
+        let sum = eight_columns(&low, &high);
+        let mut x = subtract_from::<S, V>(self.simd, self.y, self.stride, at, &sum);
+        if let Some(pivots) = self.pivots {
+            divide_transposed(self.simd, &mut x, pivots);
+        }
+        store::<S, V>(self.y, self.stride, at, &x);
+    }
+}
+
+impl<S: Simd> BackwardStrip<'_, S> {
+    /// Sums over i of `rows[i][block column first + c] * x[i][at + v]`; columns that are not there give zero.
+    #[inline(always)]
+    fn transposed_product<const V: usize, const C: usize>(&self, at: usize, first: usize) -> [[S::f64s; C]; V] {
+        let Self { simd, rows, x, block, stride, .. } = *self;
+        let start = BLOCK * BLOCK * block;
+        let columns = self.y.len() / stride;
+        let mut sum = [[simd.splat_f64s(0.0); C]; V];
+        for (row, x) in rows.iter().zip(x.chunks(BLOCK * stride)) {
+            let stored = &row[start..start + BLOCK * columns];
+            let padded;
+            let entries: &[f64; BLOCK * BLOCK] = match stored.first_chunk() {
+                Some(entries) => entries,
+                None => {
+                    padded = pivot_block(stored);
+                    &padded
+                }
+            };
+            for (r, x) in x.chunks_exact(stride).enumerate() {
+                let x: [S::f64s; V] = std::array::from_fn(|v| x[at + v]);
+                for c in 0..C {
+                    let factor = simd.splat_f64s(entries[BLOCK * (first + c) + (r % BLOCK)]);
+                    for v in 0..V {
+                        sum[v][c] = simd.mul_add_e_f64s(x[v], factor, sum[v][c]);
+                    }
                 }
             }
         }
+        sum
     }
-    sum
 }
 
 /// Solves `pivots^T * x = x` for the rows x[v][0..8].
