@@ -2,7 +2,7 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use glam::Vec3;
-use skinwright_core::linear_solve::{Cholesky, Method, SymmetricMatrix};
+use skinwright_core::linear_solve::{Cholesky, Method, RightHandSides, SymmetricMatrix};
 
 fn main() {
     divan::main();
@@ -79,29 +79,34 @@ fn order(bencher: Bencher, size: usize) {
 fn order_and_factor<const METHOD: usize>(bencher: Bencher, size: usize) {
     let (matrix, positions) = tube(size);
     let method = Method::ALL[METHOD];
-    bencher.counter(ItemsCount::new(size)).bench(|| Cholesky::factor_with(method, &matrix, &positions));
+    bencher
+        .counter(ItemsCount::new(size))
+        .with_inputs(|| matrix.clone())
+        .bench_values(|matrix| Cholesky::factor_with(method, matrix, &positions));
 }
 
 #[divan::bench(args = SIZES, consts = [0, 1], sample_count = 5, sample_size = 1)]
 fn solve<const METHOD: usize>(bencher: Bencher, size: usize) {
     let (matrix, positions) = tube(size);
-    let factor = Cholesky::factor_with(Method::ALL[METHOD], &matrix, &positions).expect("positive definite");
     let n = matrix.size();
-    bencher
-        .counter(ItemsCount::new(size))
-        .with_inputs(|| (0..n * BONES).map(|i| (i as f64).sin()).collect::<Vec<f64>>())
-        .bench_refs(|rhs| factor.solve_in_place(rhs, BONES));
+    let factor = Cholesky::factor_with(Method::ALL[METHOD], matrix, &positions).expect("positive definite");
+    let rhs = right_hand_sides(n, BONES);
+    bencher.counter(ItemsCount::new(size)).bench(|| factor.solve(&rhs));
+}
+
+fn right_hand_sides(n: usize, columns: usize) -> RightHandSides {
+    RightHandSides::dense(n, columns, (0..n * columns).map(|i| (i as f64).sin()).collect())
 }
 
 /// A wardrobe: many small components, one after the other.
 #[divan::bench(args = [10, 100, 1000], consts = [0, 1], sample_count = 5, sample_size = 1)]
 fn hundred_small_blocks<const METHOD: usize>(bencher: Bencher, size: usize) {
     let (matrix, positions) = tube(size);
-    let rhs: Vec<f64> = (0..matrix.size() * 12).map(|i| (i as f64).sin()).collect();
-    bencher.counter(ItemsCount::new(100 * size)).with_inputs(|| rhs.clone()).bench_refs(|rhs| {
-        for _ in 0..100 {
-            let factor = Cholesky::factor_with(Method::ALL[METHOD], &matrix, &positions).expect("positive definite");
-            factor.solve_in_place(rhs, 12);
+    let rhs = right_hand_sides(matrix.size(), 12);
+    bencher.counter(ItemsCount::new(100 * size)).with_inputs(|| vec![matrix.clone(); 100]).bench_values(|matrices| {
+        for matrix in matrices {
+            let factor = Cholesky::factor_with(Method::ALL[METHOD], matrix, &positions).expect("positive definite");
+            factor.solve(&rhs);
         }
     });
 }

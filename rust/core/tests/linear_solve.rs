@@ -4,7 +4,7 @@ use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Mat, Side};
 use glam::Vec3;
-use skinwright_core::linear_solve::{Cholesky, Method, NotPositive, SymmetricMatrix};
+use skinwright_core::linear_solve::{Cholesky, Method, NotPositive, RightHandSides, SymmetricMatrix};
 
 /// A repeatable stream of numbers in [-1, 1).
 struct Noise(u64);
@@ -195,6 +195,12 @@ fn cases() -> Vec<Case> {
     ]
 }
 
+/// The solutions for `rhs` (n, columns), row-major as they are.
+fn solve(factor: &Cholesky, n: usize, columns: usize, rhs: Vec<f64>) -> Vec<f64> {
+    let solution = factor.solve(&RightHandSides::dense(n, columns, rhs));
+    (0..n).flat_map(|unknown| solution.row(unknown)).collect()
+}
+
 fn noise(n: usize, seed: usize) -> Vec<f64> {
     let mut noise = Noise(seed as u64);
     (0..n).map(|_| noise.next()).collect()
@@ -213,12 +219,11 @@ fn differences(a: &[f64], b: &[f64]) -> f64 {
 fn leaves_no_residual() {
     for method in Method::ALL {
         for (name, matrix, positions) in cases() {
-            let factor = Cholesky::factor_with(method, &matrix, &positions);
+            let factor = Cholesky::factor_with(method, matrix.clone(), &positions);
             let factor = factor.unwrap_or_else(|error| panic!("{method:?}, {name}: {error:?}"));
             for columns in [0, 1, 3, 60, 70] {
                 let rhs = multiply(&matrix, &noise(matrix.size() * columns, columns), columns);
-                let mut x = rhs.clone();
-                factor.solve_in_place(&mut x, columns);
+                let x = solve(&factor, matrix.size(), columns, rhs.clone());
                 let scale = largest(rhs.iter().copied());
                 let residual = differences(&multiply(&matrix, &x, columns), &rhs);
                 assert!(residual <= 1e-10 * scale, "{method:?}, {name}, {columns} columns: {residual:e} of {scale:e}");
@@ -235,8 +240,8 @@ fn agrees_with_the_oracle() {
             let rhs = noise(n * 2, 5);
             let right = Mat::from_fn(n, 2, |i, c| rhs[i * 2 + c]);
             let wanted = if n <= 600 { dense_solve(&matrix, &right) } else { sparse_solve(&matrix, &right) };
-            let mut x = rhs.clone();
-            Cholesky::factor_with(method, &matrix, &positions).unwrap().solve_in_place(&mut x, 2);
+            let factor = Cholesky::factor_with(method, matrix, &positions).unwrap();
+            let x = solve(&factor, n, 2, rhs);
             let wanted: Vec<f64> = (0..n * 2).map(|i| wanted[(i / 2, i % 2)]).collect();
             let error = differences(&x, &wanted) / largest(wanted);
             assert!(error < 1e-9, "{method:?}, {name}: {error:e}");
@@ -272,7 +277,7 @@ fn names_the_unknown_whose_pivot_fails() {
                 let entry = matrix.column_starts[unknown];
                 for bad in [-1e3, f64::NAN] {
                     let good = std::mem::replace(&mut matrix.values[entry], bad);
-                    let error = Cholesky::factor_with(method, &matrix, &positions).unwrap_err();
+                    let error = Cholesky::factor_with(method, matrix.clone(), &positions).unwrap_err();
                     assert_eq!(error, NotPositive { unknown }, "{method:?}, {bad}");
                     matrix.values[entry] = good;
                 }
@@ -292,7 +297,7 @@ fn refuses_a_laplacian_that_nothing_holds() {
             let entries: Vec<_> = grid_edges(width, height, false).into_iter().enumerate().flat_map(weighted).collect();
             let matrix = assemble(width * height, &entries);
             let (_, _, positions) = grid("", width, height);
-            assert!(Cholesky::factor_with(method, &matrix, &positions).is_err(), "{method:?}, {width} x {height}");
+            assert!(Cholesky::factor_with(method, matrix, &positions).is_err(), "{method:?}, {width} x {height}");
         }
     }
 }
@@ -300,14 +305,15 @@ fn refuses_a_laplacian_that_nothing_holds() {
 #[test]
 fn gives_the_same_bits_on_any_number_of_threads() {
     for (name, matrix, positions) in [grid("grid", 150, 130), tube("tube", 300, 60)] {
-        let solve = |threads| {
+        let on_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut x = noise(matrix.size() * 21, 3);
-            pool.install(|| Cholesky::factor(&matrix, &positions).unwrap().solve_in_place(&mut x, 21));
+            let n = matrix.size();
+            let factor = || Cholesky::factor(matrix.clone(), &positions).unwrap();
+            let x = pool.install(|| solve(&factor(), n, 21, noise(n * 21, 3)));
             x.into_iter().map(f64::to_bits).collect::<Vec<_>>()
         };
-        let one = solve(1);
-        assert!(one == solve(2) && one == solve(3), "{name}");
+        let one = on_threads(1);
+        assert!(one == on_threads(2) && one == on_threads(3), "{name}");
     }
 }
 
@@ -315,34 +321,42 @@ fn gives_the_same_bits_on_any_number_of_threads() {
 fn leaves_zero_columns_exactly_zero() {
     for method in Method::ALL {
         let (_, matrix, positions) = tube("", 150, 60);
-        let factor = Cholesky::factor_with(method, &matrix, &positions).unwrap();
+        let n = matrix.size();
+        let factor = Cholesky::factor_with(method, matrix, &positions).unwrap();
         for columns in [12, 100] {
             let is_zero = |column: usize| column % 3 == 1;
-            let mut x = noise(matrix.size() * columns, 9);
-            x.iter_mut().enumerate().filter(|(i, _)| is_zero(i % columns)).for_each(|(_, value)| *value = 0.0);
-            factor.solve_in_place(&mut x, columns);
+            let mut rhs = noise(n * columns, 9);
+            rhs.iter_mut().enumerate().filter(|(i, _)| is_zero(i % columns)).for_each(|(_, value)| *value = 0.0);
+            let x = solve(&factor, n, columns, rhs);
             assert!(x.iter().enumerate().all(|(i, &value)| (value == 0.0) == is_zero(i % columns)));
         }
     }
 }
 
-/// Right-hand sides that live on few unknowns each take the short way through the tree.
+/// Right-hand sides that live on few unknowns each take the short way through the tree, and need not be stored in full.
 #[test]
 fn solves_sparse_right_hand_sides_as_it_does_full_ones() {
-    let (_, matrix, positions) = grid("", 90, 80);
-    let factor = Cholesky::factor(&matrix, &positions).unwrap();
-    let (n, columns) = (matrix.size(), 29);
-    let mut x = vec![0.0; n * columns];
-    let mut full = noise(n * (columns + 1), 2);
-    for i in 0..n {
-        for column in 0..columns {
-            let value = if i * 13 % 977 == column { 1.0 + i as f64 } else { 0.0 };
-            x[i * columns + column] = value;
-            full[i * (columns + 1) + column] = value;
+    for method in Method::ALL {
+        let (_, matrix, positions) = grid("", 90, 80);
+        let (n, columns) = (matrix.size(), 29);
+        let factor = Cholesky::factor_with(method, matrix, &positions).unwrap();
+        let mut sparse = vec![0.0; n * columns];
+        let mut full = noise(n * (columns + 1), 2);
+        for i in 0..n {
+            for column in 0..columns {
+                let value = if i * 13 % 977 == column { 1.0 + i as f64 } else { 0.0 };
+                sparse[i * columns + column] = value;
+                full[i * (columns + 1) + column] = value;
+            }
         }
+        let rows: Vec<u32> = (0..n as u32).rev().filter(|&i| (i as usize * 13 % 977) < columns).collect();
+        let stored = rows.iter().flat_map(|&i| sparse[i as usize * columns..][..columns].to_vec()).collect();
+        let banded = factor.solve(&RightHandSides::sparse(n, columns, &rows, stored));
+        let banded: Vec<f64> = (0..n).flat_map(|i| banded.row(i)).collect();
+        let sparse = solve(&factor, n, columns, sparse);
+        let full = solve(&factor, n, columns + 1, full);
+        let full: Vec<f64> = full.chunks_exact(columns + 1).flat_map(|row| &row[..columns]).copied().collect();
+        assert!(banded == sparse, "{method:?}");
+        assert!(differences(&sparse, &full) <= 1e-12 * largest(full), "{method:?}");
     }
-    factor.solve_in_place(&mut x, columns);
-    factor.solve_in_place(&mut full, columns + 1);
-    let full: Vec<f64> = full.chunks_exact(columns + 1).flat_map(|row| &row[..columns]).copied().collect();
-    assert!(differences(&x, &full) <= 1e-12 * largest(full));
 }

@@ -7,27 +7,29 @@ use super::buffer::Buffer;
 use super::kernels::Backward;
 use super::solve::{FORK, PIVOT_BLOCKS, row_blocks};
 use super::tree::{Front, Tree};
+use super::walk::BRANCHES;
 
-/// Subtrees with more columns than this are shared between threads.
+/// Subtrees with more columns than this are divided between threads, unless there are [`BRANCHES`] larger ones for each.
 const FORK_COLUMNS: usize = 1000;
 /// Row blocks read side by side, a block column at a time: as many as the hardware prefetches.
-const STREAMS: usize = 8;
+const STREAMS: usize = 4;
 
 /// Solves for `x` (n, width) in place, in elimination order.
 pub(super) fn backward(tree: &Tree, panels: &[f64], arch: Arch, width: usize, x: &mut [f64]) {
+    let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
     let mut space = vec![0; tree.fronts.len()];
     for (index, front) in tree.fronts.iter().enumerate() {
         let needs = front.children.iter().map(|&child| boundary_len(&tree.fronts[child], width) + space[child]);
-        space[index] = if forks(front) { needs.sum() } else { needs.max().unwrap_or(0) };
+        space[index] = if forks(front, fork) { needs.sum() } else { needs.max().unwrap_or(0) };
     }
     let root = tree.root();
     let mut work = Buffer::zeroed(space[root]);
     let panels = &panels[..tree.fronts[root].subtree_panels];
-    BackwardPass { tree, arch, width, space }.descend(root, panels, x, &[], &mut work);
+    BackwardPass { tree, arch, width, space, fork }.descend(root, panels, x, &[], &mut work);
 }
 
-fn forks(front: &Front) -> bool {
-    front.children.len() > 1 && front.subtree_columns > FORK_COLUMNS
+fn forks(front: &Front, columns: usize) -> bool {
+    front.children.len() > 1 && front.subtree_columns > columns
 }
 
 /// Length of the solution in the rows under a front's columns.
@@ -41,6 +43,8 @@ struct BackwardPass<'a> {
     width: usize,
     /// Work space for the children of each front.
     space: Vec<usize>,
+    /// Columns of a subtree from which on it is divided between threads.
+    fork: usize,
 }
 
 impl BackwardPass<'_> {
@@ -69,7 +73,7 @@ impl BackwardPass<'_> {
                     panels.split_at(sum(left, &|root| self.tree.fronts[root].subtree_panels));
                 let (x_left, x_right) =
                     x.split_at_mut(sum(left, &|root| self.tree.fronts[root].subtree_columns) * self.width);
-                if forks(parent.front) {
+                if forks(parent.front, self.fork) {
                     let space = |root: usize| boundary_len(&self.tree.fronts[root], self.width) + self.space[root];
                     let (work_left, work_right) = work.split_at_mut(sum(left, &space));
                     rayon::join(

@@ -42,8 +42,8 @@ pub(super) fn halve(points: &mut [Point], axis: Vec3, origin: Vec3) -> Plane {
     Plane { axis, origin, key: median.key, unknown: median.unknown }
 }
 
-/// Directions of greatest, second and least extent.
-pub(super) fn principal_axes(points: &[Point]) -> [Vec3; 3] {
+/// Directions of greatest and second extent. (Across the third, a surface is cut worst.)
+pub(super) fn principal_axes(points: &[Point]) -> [Vec3; 2] {
     let origin = points[0].position;
     let (mut sum, mut squares) = (DVec3::ZERO, DMat3::ZERO);
     for point in points {
@@ -59,7 +59,7 @@ pub(super) fn principal_axes(points: &[Point]) -> [Vec3; 3] {
     let second =
         dominant_axis(covariance - DMat3::from_cols(first * first.x, first * first.y, first * first.z) * spread);
     let second = (second - first * first.dot(second)).try_normalize().unwrap_or(first.any_orthonormal_vector());
-    [first.as_vec3(), second.as_vec3(), first.cross(second).as_vec3()]
+    [first.as_vec3(), second.as_vec3()]
 }
 
 /// Unit eigenvector of the largest eigenvalue, near enough, by repeated squaring.

@@ -12,7 +12,7 @@ use super::vertex_cover::minimum_vertex_cover;
 
 /// Sets above this size are cut on two threads.
 const FORK: usize = 4096;
-/// Sets above this size try every axis; below, the longest one is good enough.
+/// Sets above this size try both axes; below, the longer one is good enough.
 const TRY_AXES: usize = 8192;
 /// A separator that takes more than this share of a set larger than [`FORK`] tells that positions do not follow the graph.
 const POOR: f64 = 0.3;

@@ -40,7 +40,7 @@ impl Active {
     }
 }
 
-/// Fills `x` (n, width) in elimination order.
+/// Fills `x` (n, width), all zero, in elimination order.
 pub(super) fn forward(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) {
     let nonzero = columns.nonzero();
     let mut active: Vec<Active> = Vec::with_capacity(tree.fronts.len());
@@ -92,7 +92,6 @@ impl Visit for ForwardPass<'_> {
     fn visit(&self, index: usize, x: &mut [f64], passed: &mut [f64], received: Received) -> Result<(), Self::Error> {
         let (front, active) = (&self.tree.fronts[index], self.active[index]);
         if active.mask == 0 {
-            x.fill(0.0);
             return Ok(());
         }
         let kept = active.columns(&self.columns);
@@ -103,7 +102,6 @@ impl Visit for ForwardPass<'_> {
             let mut y = vec![0.0; front.columns * active.width];
             self.gather(front, &kept, active.width, &mut y);
             self.front(index, &mut y, passed, &received);
-            x.fill(0.0);
             for (x, y) in x.chunks_exact_mut(self.columns.width).zip(y.chunks_exact(active.width)) {
                 kept.iter().zip(y).for_each(|(&column, &value)| x[column] = value);
             }
@@ -113,16 +111,14 @@ impl Visit for ForwardPass<'_> {
 }
 
 impl ForwardPass<'_> {
-    /// Fills `y` (columns of the front, width) with the right-hand side.
+    /// Puts the right-hand side into `y` (columns of the front, width), which is zero.
     fn gather(&self, front: &Front, kept: &[usize], width: usize, y: &mut [f64]) {
         let unknowns = &self.tree.order[front.start..front.start + front.columns];
         for (y, &unknown) in y.chunks_exact_mut(width).zip(unknowns) {
-            let row = self.columns.row(unknown as usize);
-            if kept.len() == row.len() {
-                y[..row.len()].copy_from_slice(row);
-                y[row.len()..].fill(0.0);
-            } else {
-                kept.iter().zip(y).for_each(|(&column, y)| *y = row[column]);
+            match self.columns.row(unknown as usize) {
+                None => {}
+                Some(row) if kept.len() == row.len() => y[..row.len()].copy_from_slice(row),
+                Some(row) => kept.iter().zip(y).for_each(|(&column, y)| *y = row[column]),
             }
         }
     }

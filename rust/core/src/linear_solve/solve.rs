@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::backward::backward;
 use super::blocks::{BLOCK, panel_len};
 use super::forward::forward;
+use super::solution::RightHandSides;
 use super::tree::{Front, Tree};
 
 /// Work of a front (multiplications) worth a second thread.
@@ -13,17 +14,16 @@ pub(super) const FORK: usize = 1 << 19;
 /// Row blocks solved on one thread before the rest makes use of them.
 pub(super) const PIVOT_BLOCKS: usize = 16;
 
-/// Solves for some right-hand sides; `x` (n, width) is filled in elimination order.
+/// Solves for some right-hand sides; `x` (n, width), all zero, is filled in elimination order.
 pub(super) fn solve(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) {
     forward(tree, panels, arch, columns, x);
     backward(tree, panels, arch, columns.width, x);
 }
 
-/// Some right-hand sides out of `rhs` (n, columns): at most 64 (one bit each in a word), `count` from `first` on.
+/// Some columns of `rhs`: at most 64 (one bit each in a word), `count` from `first` on.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<'a> {
-    pub(super) rhs: &'a [f64],
-    pub(super) columns: usize,
+    pub(super) rhs: &'a RightHandSides,
     pub(super) first: usize,
     pub(super) count: usize,
     /// `count` padded to whole vectors.
@@ -31,24 +31,16 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    pub(super) fn row(&self, unknown: usize) -> &'a [f64] {
-        &self.rhs[unknown * self.columns + self.first..][..self.count]
-    }
-
-    /// The first column that is not zero, unless it is not finite.
-    pub(super) fn nonzero_column(&self) -> Option<usize> {
-        let rows = 0..self.rhs.len() / self.columns;
-        let column = rows.clone().find_map(|unknown| self.row(unknown).iter().position(|&value| value != 0.0))?;
-        rows.map(|unknown| self.row(unknown)[column]).all(f64::is_finite).then_some(column)
+    /// The row of an unknown, `None` if it is zero.
+    pub(super) fn row(&self, unknown: usize) -> Option<&'a [f64]> {
+        self.rhs.row(unknown).map(|row| &row[self.first..][..self.count])
     }
 
     /// Which of the columns are not zero, per unknown.
     pub(super) fn nonzero(&self) -> Vec<u64> {
-        let bits = |unknown| {
-            let row = self.row(unknown);
-            row.iter().rev().fold(0, |bits: u64, &value| bits << 1 | u64::from(value != 0.0))
-        };
-        (0..self.rhs.len() / self.columns).into_par_iter().with_min_len(1024).map(bits).collect()
+        let bits = |row: &[f64]| row.iter().rev().fold(0, |bits: u64, &value| bits << 1 | u64::from(value != 0.0));
+        let unknowns = (0..self.rhs.size()).into_par_iter().with_min_len(1024);
+        unknowns.map(|unknown| self.row(unknown).map_or(0, bits)).collect()
     }
 }
 

@@ -10,6 +10,8 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::buffer::Buffer;
+use super::solution::{Part, RightHandSides, Solution};
 use super::{NotPositive, SymmetricMatrix, pivot_floor};
 
 /// A factorisation by supernodes.
@@ -49,15 +51,21 @@ impl Supernodal {
         Ok(Self { symbolic, values })
     }
 
-    /// Solves in place, `rhs` (n, columns) row-major.
-    pub(super) fn solve_in_place(&self, rhs: &mut [f64], columns: usize) {
+    /// Solves for all columns.
+    pub(super) fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {
+        let (n, columns) = (rhs.size(), rhs.columns);
+        let mut values = Buffer::zeroed(n * columns);
+        for (i, x) in values.chunks_exact_mut(columns).enumerate() {
+            rhs.row(i).into_iter().for_each(|row| x.copy_from_slice(row));
+        }
         let scratch = self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
-            MatMut::from_row_major_slice_mut(rhs, self.symbolic.nrows(), columns),
+            MatMut::from_row_major_slice_mut(&mut values, n, columns),
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
+        Solution { place: None, parts: vec![Part { values, width: columns, count: columns }], residual: 0.0 }
     }
 
     /// Number of stored entries of the factor.

@@ -2,8 +2,11 @@
 
 use super::tree::{Front, Tree};
 
-/// Subtrees with more multiplications than this are shared between threads.
+/// Subtrees with more multiplications than this are divided between threads, unless there are so many larger ones that
+/// each thread has this number to choose from: each branch has work space of its own, and touching memory for the first
+/// time costs as much as the arithmetic.
 const FORK: f64 = 2e6;
+pub(super) const BRANCHES: usize = 16;
 
 /// What a walk does at each front.
 pub(super) trait Visit: Sync {
@@ -45,18 +48,22 @@ pub(super) struct Plan {
     other: Vec<usize>,
     /// Where a front's share begins in the space its parent gives to its children.
     offset: Vec<usize>,
+    /// Multiplications of a subtree from which on it is divided between threads.
+    fork: f64,
 }
 
 impl Plan {
     pub(super) fn new(tree: &Tree, passed_len: impl Fn(usize) -> usize) -> Self {
         let n = tree.fronts.len();
-        let mut plan = Self { own: vec![0; n], other: vec![0; n], offset: vec![0; n] };
+        let branches = (BRANCHES * rayon::current_num_threads()) as f64;
+        let fork = FORK.max(tree.fronts[tree.root()].subtree_flops / branches);
+        let mut plan = Self { own: vec![0; n], other: vec![0; n], offset: vec![0; n], fork };
         for (index, front) in tree.fronts.iter().enumerate() {
             let (mut own, mut other, mut offset) = (0, 0, 0);
             for &child in &front.children {
                 plan.offset[child] = offset;
                 other = other.max(offset + plan.own[child]);
-                if forks(front) {
+                if plan.forks(front) {
                     offset += plan.own[child];
                     own += plan.other[child];
                 } else {
@@ -70,14 +77,14 @@ impl Plan {
         plan
     }
 
+    fn forks(&self, front: &Front) -> bool {
+        front.children.len() > 1 && front.subtree_flops > self.fork
+    }
+
     /// Lengths of the two stacks.
     pub(super) fn stacks(&self, root: usize) -> (usize, usize) {
         (self.own[root], self.other[root])
     }
-}
-
-fn forks(front: &Front) -> bool {
-    front.children.len() > 1 && front.subtree_flops > FORK
 }
 
 /// Visits the subtree of `root`. `store` is the subtree's; `own` and `other` are the two stacks.
@@ -92,7 +99,7 @@ pub(super) fn walk<V: Visit>(
 ) -> Result<(), V::Error> {
     let front = &tree.fronts[root];
     let (below, store) = store.split_at_mut(store.len() - visitor.store_len(front));
-    if forks(front) {
+    if plan.forks(front) {
         walk_apart(tree, plan, visitor, &front.children, below, other, own)?;
     } else {
         let mut below = below;

@@ -9,52 +9,72 @@ use super::Source;
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
-use crate::linear_solve::{Cholesky, SymmetricMatrix};
+use crate::linear_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
 use crate::mesh::TriMesh;
 use crate::surface::SurfacePoint;
 
-/// Backward error above which a solution is refined once, and above which it is refused.
-const REFINE_ABOVE: f64 = 1e-14;
+/// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;
+
+/// The assembled system of a block of unknowns.
+#[derive(Debug)]
+pub struct System {
+    unknowns: Vec<u32>,
+    smoothness_length: f64,
+    matrix: SymmetricMatrix,
+    boundary: Boundary,
+}
+
+impl System {
+    /// Assembles the block of `unknowns`; `number` is from [`number_unknowns`].
+    pub fn new(laplacian: &Laplacian, unknowns: Vec<u32>, number: &[u32], smoothness_length: f64) -> Self {
+        let (matrix, boundary) = system::assemble(laplacian, &unknowns, number, smoothness_length);
+        Self { unknowns, smoothness_length, matrix, boundary }
+    }
+}
 
 /// A factored block of unknowns. It depends on the mesh, on which vertices are unknown and on l; never on weights.
 #[derive(Debug)]
 pub struct Block {
     unknowns: Vec<u32>,
     smoothness_length: f64,
-    matrix: SymmetricMatrix,
     boundary: Boundary,
     factor: Cholesky,
 }
 
-/// Raw weights of a block's unknowns: `values` is (unknowns, bones), row-major, before any clamping.
+/// Raw weights of a block's unknowns, before any clamping.
 #[derive(Debug)]
-pub struct BlockWeights {
-    /// Bones that reach the block, ascending.
-    pub bones: Vec<u32>,
-    /// Raw weights.
-    pub values: Vec<f64>,
-    /// Backward error of the solve (see [`Block::solve`]).
-    pub residual: f64,
+pub struct BlockWeights<'b> {
+    bones: Vec<u32>,
+    /// `None` if one bone alone reaches the block: weights sum to one, so it has weight one everywhere.
+    solution: Option<Solution<'b>>,
+}
+
+impl BlockWeights<'_> {
+    /// Bones and raw weights of the block's unknown `k`, by bone.
+    pub fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let one = self.solution.is_none().then_some(1.0);
+        let values = one.into_iter().chain(self.solution.iter().flat_map(move |solution| solution.row(k)));
+        std::iter::zip(self.bones.iter().copied(), values)
+    }
+
+    /// Backward error of the solve.
+    pub fn residual(&self) -> f64 {
+        self.solution.as_ref().map_or(0.0, Solution::residual)
+    }
 }
 
 impl Block {
-    /// Assembles and factors the block of `unknowns`; `number` is from [`number_unknowns`].
+    /// Factors an assembled block.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`] with a vertex of the block.
-    pub fn new(
-        mesh: &TriMesh<'_>,
-        laplacian: &Laplacian,
-        unknowns: Vec<u32>,
-        number: &[u32],
-        smoothness_length: f64,
-    ) -> Result<Self> {
-        let (matrix, boundary) = system::assemble(laplacian, &unknowns, number, smoothness_length);
+    pub fn new(mesh: &TriMesh<'_>, system: System) -> Result<Self> {
+        let System { unknowns, smoothness_length, matrix, boundary } = system;
         let positions: Vec<_> = unknowns.iter().map(|&i| mesh.positions()[i as usize].into()).collect();
-        let factor = Cholesky::factor(&matrix, &positions)
+        let factor = Cholesky::factor(matrix, &positions)
             .map_err(|e| Error::NotPositiveDefinite { vertex: unknowns[e.unknown] as usize })?;
-        Ok(Self { unknowns, smoothness_length, matrix, boundary, factor })
+        Ok(Self { unknowns, smoothness_length, boundary, factor })
     }
 
     /// The block's vertices, ascending.
@@ -69,102 +89,41 @@ impl Block {
 
     /// Raw weights of the unknowns, given the source and each vertex' closest `points` (V) on it.
     ///
-    /// The residual is the normwise backward error `|r| / (|Q| |x| + |b|)` (maximum norms) of one pseudo-random combination of the
-    /// columns: it costs one product and sees an error in any column.
-    ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] if the residual stays above 1e-8 after refinement.
-    pub fn solve(&self, source: &Source, points: &[SurfacePoint]) -> Result<BlockWeights> {
+    /// [`Error::NotPositiveDefinite`] if the backward error stays above 1e-8.
+    pub fn solve(&self, source: &Source, points: &[SurfacePoint]) -> Result<BlockWeights<'_>> {
         let rows: Vec<Vec<(u32, f64)>> =
             self.boundary.vertices.par_iter().map(|&i| blended(source, &points[i as usize])).collect();
         let mut bones: Vec<u32> = rows.iter().flatten().map(|&(bone, _)| bone).collect();
         bones.sort_unstable();
         bones.dedup();
         if bones.len() == 1 {
-            // The weights sum to one everywhere, so a single bone has weight one everywhere.
-            return Ok(BlockWeights { bones, values: vec![1.0; self.unknowns.len()], residual: 0.0 });
+            return Ok(BlockWeights { bones, solution: None });
         }
-        let rhs = self.right_hand_sides(&rows, &bones);
-        let mut values = rhs.clone();
-        self.factor.solve_in_place(&mut values, bones.len());
-        let mut residual = self.residual(&values, &rhs, bones.len());
-        if residual > REFINE_ABOVE {
-            self.refine(&mut values, &rhs, bones.len());
-            residual = self.residual(&values, &rhs, bones.len());
-        }
-        if residual.is_nan() || residual > REFUSE_ABOVE {
+        let solution = self.factor.solve(&self.right_hand_sides(&rows, &bones));
+        if solution.residual().is_nan() || solution.residual() > REFUSE_ABOVE {
             return Err(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize });
         }
-        Ok(BlockWeights { bones, values, residual })
+        Ok(BlockWeights { bones, solution: Some(solution) })
     }
 
-    /// `-Q_UI W_I`, (unknowns, bones) row-major.
-    fn right_hand_sides(&self, rows: &[Vec<(u32, f64)>], bones: &[u32]) -> Vec<f64> {
+    /// `-Q_UI W_I`, (unknowns, bones).
+    fn right_hand_sides(&self, rows: &[Vec<(u32, f64)>], bones: &[u32]) -> RightHandSides {
         let mut column = vec![0u32; bones.last().map_or(0, |&bone| bone as usize + 1)];
         for (k, &bone) in bones.iter().enumerate() {
             column[bone as usize] = k as u32;
         }
-        let mut rhs = vec![0.0; self.unknowns.len() * bones.len()];
-        rhs.par_chunks_mut(bones.len()).with_min_len(256).enumerate().for_each(|(u, row)| {
-            for at in self.boundary.starts[u]..self.boundary.starts[u + 1] {
+        let entries = |u: u32| self.boundary.starts[u as usize]..self.boundary.starts[u as usize + 1];
+        let band: Vec<u32> = (0..self.unknowns.len() as u32).filter(|&u| !entries(u).is_empty()).collect();
+        let mut values = vec![0.0; band.len() * bones.len()];
+        values.par_chunks_mut(bones.len().max(1)).zip(&band).with_min_len(256).for_each(|(row, &u)| {
+            for at in entries(u) {
                 for &(bone, weight) in &rows[self.boundary.columns[at] as usize] {
                     row[column[bone as usize] as usize] -= self.boundary.values[at] * weight;
                 }
             }
         });
-        rhs
-    }
-
-    fn residual(&self, x: &[f64], b: &[f64], columns: usize) -> f64 {
-        let signs: Vec<f64> =
-            (0..columns as u32).map(|k| if (k * 0x9E37 + 0x79B9) & 0x40 == 0 { 1.0 } else { -0.6 }).collect();
-        let combine = |rows: &[f64]| -> Vec<f64> {
-            let dot = |row: &[f64]| std::iter::zip(row, &signs).map(|(a, b)| a * b).sum();
-            rows.par_chunks(columns).with_min_len(256).map(dot).collect()
-        };
-        let (x, b) = (combine(x), combine(b));
-        let mut r = b.clone();
-        let mut absolute_row_sums = vec![0.0; r.len()];
-        for_each_entry(&self.matrix, |i, j, value| {
-            r[i] -= value * x[j];
-            absolute_row_sums[i] += value.abs();
-        });
-        let norm = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let scale = norm(&absolute_row_sums) * norm(&x) + norm(&b);
-        if r.iter().any(|x| x.is_nan()) {
-            f64::NAN
-        } else if scale == 0.0 {
-            0.0
-        } else {
-            norm(&r) / scale
-        }
-    }
-
-    /// One step of iterative refinement.
-    fn refine(&self, x: &mut [f64], b: &[f64], columns: usize) {
-        let mut correction = b.to_vec();
-        for_each_entry(&self.matrix, |i, j, value| {
-            for k in 0..columns {
-                correction[i * columns + k] -= value * x[j * columns + k];
-            }
-        });
-        self.factor.solve_in_place(&mut correction, columns);
-        for (x, dx) in std::iter::zip(x, correction) {
-            *x += dx;
-        }
-    }
-}
-
-/// Calls `visit(row, column, value)` for every entry of the whole matrix, both triangles.
-fn for_each_entry(matrix: &SymmetricMatrix, mut visit: impl FnMut(usize, usize, f64)) {
-    for (j, range) in matrix.column_starts.windows(2).enumerate() {
-        for at in range[0]..range[1] {
-            let (i, value) = (matrix.rows[at] as usize, matrix.values[at]);
-            visit(i, j, value);
-            if i != j {
-                visit(j, i, value);
-            }
-        }
+        RightHandSides::sparse(self.unknowns.len(), bones.len(), &band, values)
     }
 }
 

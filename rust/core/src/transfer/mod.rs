@@ -4,6 +4,7 @@
 //! minimising a smoothness energy ([`inpaint`]); parts without any match follow an [`IslandPolicy`]; then come
 //! optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used again.
 
+mod blocks;
 pub mod inpaint;
 pub mod islands;
 pub mod limit;

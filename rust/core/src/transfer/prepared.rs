@@ -1,14 +1,11 @@
 //! A target prepared on a source: matching found once, factorisations kept.
 
-use rayon::prelude::*;
-
-use super::inpaint::{Block, BlockWeights};
+use super::blocks::{Blocks, Solved};
 use super::islands::Scene;
 use super::matching::Closest;
 use super::problem::Problem;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
-use super::system::{independent_blocks, number_unknowns};
 use super::{Criteria, MaskValue, Settings, Source, Transfer, limit, smooth};
 use crate::adjacency::{Islands, NONE, clean_triangles};
 use crate::error::{Error, Result};
@@ -32,7 +29,7 @@ pub struct Inpainting {
     pub(super) islands: Islands,
     laplacian: Laplacian,
     pub(super) closest: Closest,
-    blocks: Vec<Block>,
+    blocks: Blocks,
     preparation: Vec<(&'static str, f64)>,
 }
 
@@ -78,7 +75,7 @@ impl Inpainting {
             closest,
             positions,
             triangles,
-            blocks: Vec::new(),
+            blocks: Blocks::default(),
             preparation,
         })
     }
@@ -126,11 +123,16 @@ impl Inpainting {
     pub fn solve(&mut self, mask: Option<&[MaskValue]>, settings: &Settings, progress: &Progress) -> Result<Transfer> {
         let mut stages = Stages::start();
         let problem = Problem::new(self, mask, settings)?;
-        let factored_blocks = self.factor(&problem, progress)?;
+        let missing = self.blocks.assemble_missing(&self.laplacian, &problem, progress)?;
+        let factored_blocks = missing.len();
+        stages.end("assemble");
+        let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
+        self.blocks.factor(&mesh, missing, progress)?;
         stages.end("factor");
-        let solutions = self.solve_blocks(progress)?;
-        let weights = self.gather(&problem, &solutions);
+        let solved = self.blocks.solve(&self.source, &self.closest.points, progress)?;
         stages.end("solve");
+        let weights = self.gather(&problem, &solved);
+        stages.end("gather");
         let weights = self.smooth(weights, &problem, settings);
         stages.end("smooth");
         progress.check()?;
@@ -148,11 +150,11 @@ impl Inpainting {
             inpainted: count(&problem.unknown),
             loose: self.islands.of_vertex().iter().filter(|&&island| island == NONE).count(),
             islands: self.islands.count(),
-            blocks: self.blocks.len(),
+            blocks: self.blocks.count(),
             max_distance: problem.criteria.max_distance,
             smoothness_length: problem.smoothness_length,
-            raw_minimum: raw_minimum(&solutions),
-            largest_residual: solutions.iter().map(|s| s.residual).fold(0.0, f64::max),
+            raw_minimum: solved.minimum(),
+            largest_residual: solved.largest_residual(),
             seconds: self.preparation.iter().copied().chain(stages.into_seconds()).collect(),
             ..Report::of_weights(&weights)
         };
@@ -167,18 +169,17 @@ impl Inpainting {
     pub fn raw_weights(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<RawWeights> {
         let problem = Problem::new(self, mask, settings)?;
         let progress = Progress::default();
-        self.factor(&problem, &progress)?;
-        let solutions = self.solve_blocks(&progress)?;
-        let vertices: Vec<u32> = (0..problem.unknown.len() as u32).filter(|&i| problem.unknown[i as usize]).collect();
+        let missing = self.blocks.assemble_missing(&self.laplacian, &problem, &progress)?;
+        let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
+        self.blocks.factor(&mesh, missing, &progress)?;
+        let solved = self.blocks.solve(&self.source, &self.closest.points, &progress)?;
+        let places = solved.places(self.positions.len());
+        let vertices: Vec<u32> = (0..places.len() as u32).filter(|&i| problem.unknown[i as usize]).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
-        for (block, solution) in std::iter::zip(&self.blocks, &solutions) {
-            for (row, i) in std::iter::zip(solution.values.chunks_exact(solution.bones.len()), block.unknowns()) {
-                let at = vertices.binary_search(i).expect("every unknown is listed") * n_bones;
-                for (&bone, &value) in std::iter::zip(&solution.bones, row) {
-                    values[at + bone as usize] = value;
-                }
-            }
+        for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
+            let (b, k) = places[i as usize];
+            solved.row(b, k).for_each(|(bone, value)| values[bone as usize] = value);
         }
         Ok(RawWeights { vertices, values })
     }
@@ -199,57 +200,14 @@ impl Inpainting {
         }
     }
 
-    /// Brings the kept blocks in line with `problem`; returns how many had to be factored.
-    fn factor(&mut self, problem: &Problem, progress: &Progress) -> Result<usize> {
-        let l = problem.smoothness_length;
-        let wanted = independent_blocks(&self.laplacian, &problem.unknown, l);
-        let number = number_unknowns(&wanted, self.positions.len());
-        let mut kept = std::mem::take(&mut self.blocks);
-        kept.retain(|block| {
-            let at = wanted.binary_search_by_key(&block.unknowns()[0], |unknowns| unknowns[0]);
-            at.is_ok_and(|at| block.serves(&wanted[at], l))
-        });
-        let missing =
-            |unknowns: &Vec<u32>| kept.binary_search_by_key(&unknowns[0], |block| block.unknowns()[0]).is_err();
-        let missing: Vec<Vec<u32>> = wanted.into_iter().filter(missing).collect();
-        let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
-        let total = missing.len();
-        let factor = |unknowns| {
-            progress.check()?;
-            Block::new(&mesh, &self.laplacian, unknowns, &number, l)
-        };
-        let fresh: Result<Vec<Block>> = missing.into_par_iter().map(factor).collect();
-        self.blocks = kept;
-        self.blocks.extend(fresh?);
-        self.blocks.sort_by_key(|block| block.unknowns()[0]);
-        progress.report(0.7);
-        progress.check()?;
-        Ok(total)
-    }
-
-    fn solve_blocks(&self, progress: &Progress) -> Result<Vec<BlockWeights>> {
-        let solve = |block: &Block| {
-            progress.check()?;
-            block.solve(&self.source, &self.closest.points)
-        };
-        self.blocks.par_iter().map(solve).collect()
-    }
-
     /// Copies matched rows, clamps and normalises solved ones; rows of islands without a match stay empty.
-    fn gather(&self, problem: &Problem, solutions: &[BlockWeights]) -> Weights {
-        let mut block_of = vec![(NONE, NONE); self.positions.len()];
-        for (b, block) in self.blocks.iter().enumerate() {
-            for (k, &i) in block.unknowns().iter().enumerate() {
-                block_of[i as usize] = (b as u32, k as u32);
-            }
-        }
+    fn gather(&self, problem: &Problem, solved: &Solved<'_>) -> Weights {
+        let places = solved.places(self.positions.len());
         Weights::from_rows(self.positions.len(), self.source.n_bones(), Vec::new, |row, i, out| {
             row.clear();
-            let (b, k) = block_of[i];
+            let (b, k) = places[i];
             if b != NONE {
-                let BlockWeights { bones, values, .. } = &solutions[b as usize];
-                let values = &values[k as usize * bones.len()..][..bones.len()];
-                row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, value)));
+                row.extend(solved.row(b, k));
             } else if problem.matched[i] {
                 self.source.blend(&self.closest.points[i], row);
             }
@@ -282,10 +240,4 @@ impl Inpainting {
 
 fn count(flags: &[bool]) -> usize {
     flags.iter().filter(|&&flag| flag).count()
-}
-
-fn raw_minimum(solutions: &[BlockWeights]) -> f64 {
-    let minima = solutions.par_iter().map(|s| s.values.iter().copied().fold(f64::INFINITY, f64::min));
-    let minimum = minima.reduce(|| f64::INFINITY, f64::min);
-    if minimum.is_finite() { minimum } else { 0.0 }
 }

@@ -63,12 +63,12 @@ fn eliminate_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
     for group in 0..R * stride / V {
         let place: [(usize, usize); V] = std::array::from_fn(|v| vector_place::<S>(V * group + v));
         let mut x = {
-            let done = place.map(|(row, part)| &S::as_simd_f64s(&rows[row]).0[part..]);
+            let done = place.map(|(row, part)| &S::as_simd_f64s(rows[row]).0[part..]);
             product::<S, V, C>(simd, done, stride, before)
         };
         for v in 0..V {
             let (row, part) = place[v];
-            let now = &S::as_simd_f64s(&rows[row]).0[start..];
+            let now = &S::as_simd_f64s(rows[row]).0[start..];
             for c in 0..BLOCK {
                 let old = if c < width { now[c * stride + part] } else { simd.splat_f64s(0.0) };
                 x[v][c] = simd.sub_f64s(old, x[v][c]);
