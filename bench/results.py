@@ -17,7 +17,7 @@ Figures = dict[str, dict[str, dict]]  # by size, then by method: wall, cpu, peak
 
 
 def own_solve(figures: dict[str, dict]) -> float:
-    """Seconds of our order + factor + solve of the one-component system."""
+    """Seconds of our order + factor + solve of the one-component system, assembled as the peers get it."""
     stages = figures["skinwright one component"]["stages"]
     return stages["factor"] + stages["solve"]
 
@@ -46,10 +46,11 @@ CURVES = {
 }
 
 
-def write(figures: Figures, plans: dict, folder: Path, load: float) -> None:
-    """Both files."""
+def write(figures: Figures, plans: dict, operators: list[str], folder: Path, load: float) -> None:
+    """Both files; `operators` are the lines of operator_wall.py, of each Blender."""
     vertices = {size: len(meshes.load(size).positions) for size in figures}
-    (folder / "results.md").write_text("\n".join(_report(figures, vertices, plans, load)) + "\n")
+    report = _report(figures, vertices, plans, load) + _inside_blender(operators)
+    (folder / "results.md").write_text("\n".join(report) + "\n")
     _plot(figures, vertices, folder / "results.png")
 
 
@@ -90,6 +91,18 @@ def _report(figures: Figures, vertices: dict[str, int], plans: dict, load: float
             lines += ["", f"{method} by stage: {stages}."]
         lines.append("")
     return lines
+
+
+def _inside_blender(operators: list[str]) -> list[str]:
+    if not operators:
+        return []
+    return [
+        "## The operator inside Blender against the native call alone",
+        "",
+        "Made by operator_wall.py, in turn; Blender's part is reading meshes and weights and writing the groups.",
+        "",
+        *operators,
+    ]
 
 
 def _ratios(figures: Figures, vertices: dict[str, int], measure: str) -> list[str]:
