@@ -6,6 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use rayon::prelude::*;
 use skinwright_core::Progress;
 use skinwright_core::transfer::{self as core, IslandPolicy, Length, MaskValue, Settings};
 
@@ -13,6 +14,11 @@ use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter, to_python};
 use crate::job::Job;
 use crate::weights::Weights;
+
+/// Triangles (Q,), barycentric coordinates (Q, 3) and distances (Q,).
+type ClosestPoints<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+/// Unknowns (U,) and their solution (U, n_bones).
+type RawWeights<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
 
 /// What a transfer gives back; every array has one entry a target vertex.
 #[pyclass(frozen, get_all, module = "skinwright_native")]
@@ -169,13 +175,15 @@ impl Source {
         py: Python<'py>,
         positions: Matrix<'_, f32>,
         threads: usize,
-    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<ClosestPoints<'py>> {
         let positions = triples(&positions, "positions")?;
-        let points = enter(py, threads, || Ok(self.core.index().closest_points(&positions)))?;
-        let triangles = points.iter().map(|point| point.triangle).collect();
-        let barycentric = points.iter().flat_map(|point| point.barycentric).collect();
-        let distances = points.iter().map(|point| point.distance).collect();
-        let barycentric = PyArray1::from_vec(py, barycentric).reshape([points.len(), 3])?;
+        let (triangles, barycentric, distances) = enter(py, threads, || {
+            let points = self.core.index().closest_points(&positions);
+            let columns = points.into_par_iter().map(|p| (p.triangle, (p.barycentric, p.distance)));
+            let (triangles, (barycentric, distances)): (Vec<_>, (Vec<_>, Vec<_>)) = columns.unzip();
+            Ok((triangles, barycentric, distances))
+        })?;
+        let barycentric = PyArray1::from_vec(py, barycentric.into_flattened()).reshape([triangles.len(), 3])?;
         Ok((PyArray1::from_vec(py, triangles), barycentric, PyArray1::from_vec(py, distances)))
     }
 
@@ -326,11 +334,7 @@ impl Inpainting {
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other
     /// solvers.
     #[pyo3(signature = (**settings))]
-    fn raw_weights<'py>(
-        &self,
-        py: Python<'py>,
-        settings: Option<&Bound<'py, PyDict>>,
-    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>)> {
+    fn raw_weights<'py>(&self, py: Python<'py>, settings: Option<&Bound<'py, PyDict>>) -> PyResult<RawWeights<'py>> {
         let (settings, mask) = keywords(settings)?;
         let raw = self.enter(py, |inpainting| inpainting.raw_weights(mask.as_deref(), &settings))?;
         let n_bones = raw.values.len().checked_div(raw.vertices.len()).unwrap_or(0);

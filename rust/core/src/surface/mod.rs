@@ -63,11 +63,9 @@ impl SurfaceIndex {
             let queries: Vec<_> = order.iter().map(|&i| queries[i as usize]).collect();
             self.answer(&queries, answers);
         });
-        let mut answers = vec![SurfacePoint::default(); queries.len()];
-        for (&i, &answer) in order.iter().zip(&along_curve) {
-            answers[i as usize] = answer;
-        }
-        answers
+        let mut place = vec![0; queries.len()];
+        order.iter().zip(0u32..).for_each(|(&i, along)| place[i as usize] = along);
+        place.into_par_iter().with_min_len(BATCH).map(|along| along_curve[along as usize]).collect()
     }
 
     /// Exact closest point for one query, world space.

@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 
+use super::closest_point::{rough_squared_distance, rounding};
+
 /// Children of a node and triangles of a leaf.
 pub(super) const WIDTH: usize = 8;
 /// Marks a child that is a leaf.
@@ -18,6 +20,10 @@ pub(super) struct Leaf {
     corners: [[[f32; WIDTH]; 3]; 3],
     /// The mesh's triangle indices.
     pub(super) triangles: [u32; WIDTH],
+    /// Largest error of a rough distance, relative to the farthest corner's.
+    rounding: f32,
+    /// Longest edge.
+    edge: f32,
 }
 
 /// Up to eight boxes in a common frame, lane by lane.
@@ -38,15 +44,38 @@ pub(super) struct Node {
 impl Leaf {
     /// Of up to eight triangles: corners and index.
     pub(super) fn new(triangles: &[([Vec3; 3], u32)]) -> Self {
-        let mut leaf = Self { corners: Default::default(), triangles: [0; WIDTH] };
+        let mut leaf = Self { corners: Default::default(), triangles: [0; WIDTH], rounding: 0.0, edge: 0.0 };
         for lane in 0..WIDTH {
             let (corners, triangle) = triangles[lane.min(triangles.len() - 1)];
             leaf.triangles[lane] = triangle;
             for (stored, corner) in leaf.corners.iter_mut().zip(corners) {
                 (0..3).for_each(|axis| stored[axis][lane] = corner[axis]);
             }
+            leaf.rounding = leaf.rounding.max(rounding(corners.map(Vec3::as_dvec3)));
+            let [a, b, c] = corners;
+            leaf.edge = leaf.edge.max(a.distance(b)).max(a.distance(c)).max(b.distance(c));
         }
         leaf
+    }
+
+    /// Squared distances of the triangles from `query` in f32, good for [`Leaf::possible`] only.
+    #[inline(always)]
+    pub(super) fn rough_squared_distances(&self, query: Vec3) -> [f32; WIDTH] {
+        let mut squared = [0.0; WIDTH];
+        for (lane, squared) in squared.iter_mut().enumerate() {
+            let corner = |[x, y, z]: &[[f32; WIDTH]; 3]| Vec3::new(x[lane], y[lane], z[lane]) - query;
+            *squared = rough_squared_distance([0, 1, 2].map(|k| corner(&self.corners[k])));
+        }
+        squared
+    }
+
+    /// Which triangles may be no farther than `distance`, given their rough squared distances.
+    #[inline(always)]
+    pub(super) fn possible(&self, rough: &[f32; WIDTH], distance: f64) -> u32 {
+        // The farthest corner is no farther than the distance and an edge.
+        let limit = (distance as f32 + self.rounding * self.edge) * (1.0 + 4.0 * self.rounding);
+        let limit = if self.rounding < 0.25 { limit * limit } else { f32::INFINITY };
+        mask(rough.map(|squared| squared <= limit || !squared.is_finite()))
     }
 
     /// Corners of the triangle in `lane`, relative to `query`; in f64 the difference of two f32 loses next to nothing.
@@ -127,6 +156,12 @@ impl Node {
         }
         squared
     }
+}
+
+/// Lanes as bits.
+#[inline(always)]
+pub(super) fn mask(lanes: [bool; WIDTH]) -> u32 {
+    lanes.iter().enumerate().fold(0, |mask, (lane, &is_set)| mask | u32::from(is_set) << lane)
 }
 
 /// How far beyond an interval, from the signed distances to its ends.

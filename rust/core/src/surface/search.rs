@@ -1,12 +1,14 @@
 //! The search for the triangle nearest to a query.
+//!
+//! The eight triangles of a leaf are looked at in f32, and in f64 only those that the bound on its error lets be nearest.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use pulp::{Simd, WithSimd};
 
 use super::SurfacePoint;
 use super::bvh::Bvh;
 use super::closest_point::closest_to_origin;
-use super::node::{LEAF, WIDTH};
+use super::node::{LEAF, Leaf, mask};
 
 /// Squared distances to boxes are f32; this much more than the best so far is still looked into.
 const BOX_SLACK: f64 = 1e-5;
@@ -30,41 +32,42 @@ impl WithSimd for Batch<'_> {
         for (&query, answer) in self.queries.iter().zip(self.answers) {
             let nearest = nearest(self.bvh, query, start, &mut stack);
             start = nearest.leaf;
-            *answer = nearest.surface_point(self.bvh, query);
+            *answer = nearest.surface_point();
         }
     }
 }
 
-/// A triangle and how far it is.
+/// A triangle, its point nearest to the query, and how far that is.
 #[derive(Clone, Copy)]
 struct Nearest {
     squared: f64,
+    barycentric: [f64; 3],
     triangle: u32,
     leaf: u32,
-    lane: usize,
 }
 
 impl Nearest {
     #[inline(always)]
-    fn surface_point(self, bvh: &Bvh, query: [f32; 3]) -> SurfacePoint {
-        let query = Vec3::from(query).as_dvec3();
-        let (barycentric, squared) = closest_to_origin(bvh.leaves[self.leaf as usize].corners_from(query, self.lane));
-        SurfacePoint { triangle: self.triangle, barycentric, distance: squared.sqrt() }
+    fn surface_point(self) -> SurfacePoint {
+        SurfacePoint { triangle: self.triangle, barycentric: self.barycentric, distance: self.squared.sqrt() }
     }
 
-    /// Takes the triangles of `leaf` into account, of equally near ones the lowest index.
+    /// Takes the triangles of `leaf`, the hierarchy's number `place`, into account, of equally near ones the lowest index.
     #[inline(always)]
-    fn visit(&mut self, bvh: &Bvh, leaf: u32, query: DVec3) {
-        let stored = &bvh.leaves[leaf as usize];
-        let mut squared = [0.0; WIDTH];
-        for (lane, squared) in squared.iter_mut().enumerate() {
-            *squared = closest_to_origin(stored.corners_from(query, lane)).1;
-        }
-        for lane in lanes(mask(squared.map(|s| s <= self.squared))) {
-            let triangle = stored.triangles[lane];
-            if squared[lane] < self.squared || (squared[lane] == self.squared && triangle < self.triangle) {
-                *self = Self { squared: squared[lane], triangle, leaf, lane };
+    fn visit(&mut self, leaf: &Leaf, place: u32, query: Vec3) {
+        let rough = leaf.rough_squared_distances(query);
+        let mut left = leaf.possible(&rough, self.squared.sqrt());
+        while left != 0 {
+            let mut lane = left.trailing_zeros() as usize;
+            for other in lanes(left) {
+                lane = if rough[other] < rough[lane] { other } else { lane };
             }
+            let (barycentric, squared) = closest_to_origin(leaf.corners_from(query.as_dvec3(), lane));
+            let triangle = leaf.triangles[lane];
+            if squared < self.squared || (squared == self.squared && triangle < self.triangle) {
+                *self = Self { squared, barycentric, triangle, leaf: place };
+            }
+            left &= leaf.possible(&rough, self.squared.sqrt()) & !(1 << lane);
         }
     }
 
@@ -78,10 +81,9 @@ impl Nearest {
 /// Descends into the nearest box first. `start` is a leaf that is likely near; it does not change the answer.
 #[inline(always)]
 fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) -> Nearest {
-    let exact = Vec3::from(query).as_dvec3();
     let first = bvh.leaves[start as usize].triangles[0];
-    let mut best = Nearest { squared: f64::INFINITY, triangle: first, leaf: start, lane: 0 };
-    best.visit(bvh, start, exact);
+    let mut best = Nearest { squared: f64::INFINITY, barycentric: [1.0, 0.0, 0.0], triangle: first, leaf: start };
+    best.visit(&bvh.leaves[start as usize], start, query.into());
     stack.clear();
     stack.push((0.0, bvh.root));
     while let Some((squared, child)) = stack.pop() {
@@ -90,7 +92,8 @@ fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) 
         }
         if child & LEAF != 0 {
             if child != LEAF | start {
-                best.visit(bvh, child & !LEAF, exact);
+                let leaf = child & !LEAF;
+                best.visit(&bvh.leaves[leaf as usize], leaf, query.into());
             }
             continue;
         }
@@ -105,18 +108,13 @@ fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) 
     best
 }
 
-#[inline(always)]
-fn mask(lanes: [bool; WIDTH]) -> u32 {
-    lanes.iter().enumerate().fold(0, |mask, (lane, &is_set)| mask | u32::from(is_set) << lane)
-}
-
 /// The lanes that are set, in order.
 #[inline(always)]
 fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = mask.trailing_zeros() as usize;
         mask &= mask.wrapping_sub(1);
-        (lane < WIDTH).then_some(lane)
+        (lane < u32::BITS as usize).then_some(lane)
     })
 }
 
