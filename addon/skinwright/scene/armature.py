@@ -56,12 +56,21 @@ def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Seq
 
     object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world
     """
-    armature_from_object = armature.matrix_world.inverted_safe() @ obj.matrix_world
-    object_from_armature = armature_from_object.inverted_safe()
     if armature.data.pose_position == "REST":
         return np.tile(np.eye(4), (len(bones), 1, 1))
-    moved = (armature.pose.bones[name].matrix @ armature.data.bones[name].matrix_local.inverted() for name in bones)
-    return np.array([object_from_armature @ matrix @ armature_from_object for matrix in moved]).reshape(-1, 4, 4)
+    armature_from_object = armature.matrix_world.inverted_safe() @ obj.matrix_world
+    object_from_armature = armature_from_object.inverted_safe()
+    pose = _matrices(armature.pose.bones, "matrix", bones)
+    rest = _matrices(armature.data.bones, "matrix_local", bones)
+    return np.array(object_from_armature) @ pose @ np.linalg.inv(rest) @ np.array(armature_from_object)
+
+
+def _matrices(all_bones: bpy.types.bpy_prop_collection, name: str, bones: Sequence[str]) -> NDArray[np.float64]:
+    """(B, 4, 4) a matrix of each of these bones: all in one call, as one by one they take five times as long."""
+    columns = np.empty((len(all_bones), 4, 4), np.float32)
+    all_bones.foreach_get(name, columns.ravel())
+    index = {bone: i for i, bone in enumerate(all_bones.keys())}
+    return columns[[index[bone] for bone in bones]].transpose(0, 2, 1).astype(np.float64)
 
 
 def segments(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float32]:

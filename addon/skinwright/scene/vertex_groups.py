@@ -15,8 +15,18 @@ from .error import SceneError
 # Blender stores a name in 64 bytes, the last of them zero.
 _NAME_BYTES = 63
 
-# Row, group index and weight of each, in stored order.
-Memberships = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+
+@dataclass(frozen=True)
+class Memberships:
+    """Of some vertices, in stored order: row among them, group index and weight of each.
+
+    `array` is Blender's own memory, where that can be reached: valid until Blender next touches the mesh.
+    """
+
+    row: NDArray[np.int64]
+    group: NDArray[np.int64]
+    values: NDArray[np.float32]
+    array: deform_array.DeformArray | None = None
 
 
 @dataclass(frozen=True)
@@ -64,10 +74,10 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     indices = [obj.vertex_groups.find(_stored(name)) for name in names]
     if all(index < 0 for index in indices):
         return csr.empty(n)
-    row, group, values = _memberships(obj.data, np.arange(n))
-    column = _lookup(indices, group)
+    held = _memberships(obj.data, np.arange(n))
+    column = _lookup(indices, held.group)
     keep = column >= 0
-    vertex, column, values = row[keep], column[keep], values[keep]
+    vertex, column, values = held.row[keep], column[keep], held.values[keep]
     _check_finite(obj, names, vertex, column, values)
     order = np.argsort(vertex * len(names) + column, kind="stable")
     indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n))])
@@ -84,18 +94,35 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     mesh = obj.data
     indices = np.arange(len(mesh.vertices)) if vertices is None else np.asarray(vertices)
     row, group = np.repeat(np.arange(len(indices)), np.diff(rows.indptr)), owned[rows.bones]
-    held_row, held_group, _ = _memberships(mesh, indices)
-    mine = np.isin(held_group, owned)
-    held_row, held_group = held_row[mine], held_group[mine]
-    missing = ~_find(np.sort(_keys(held_row, held_group), kind="stable"), _keys(row, group))[1]
-    stale = ~_find(np.sort(_keys(row, group), kind="stable"), _keys(held_row, held_group))[1]
-    # Only these change the memberships themselves, in one call a group; the rest is values.
+    held = _memberships(mesh, indices)
+    if _change_members(obj, indices, held, owned, row, group):
+        held = _memberships(mesh, indices)
+    _set_weights(mesh, indices, held, row, group, rows.values)
+    mesh.update()
+
+
+def _change_members(
+    obj: bpy.types.Object,
+    indices: NDArray[np.integer],
+    held: Memberships,
+    owned: NDArray[np.int64],
+    row: NDArray[np.int64],
+    group: NDArray[np.int64],
+) -> bool:
+    """Give the vertices the memberships (row, group) in place of those in the groups `owned`; whether any differed."""
+    mine = np.isin(held.group, owned)
+    held_row, held_group = held.row[mine], held.group[mine]
+    held_keys, keys = _keys(held_row, held_group), _keys(row, group)
+    held_order, order = np.sort(held_keys, kind="stable"), np.sort(keys, kind="stable")
+    if np.array_equal(held_order, order):
+        return False
+    missing, stale = ~_find(held_order, keys)[1], ~_find(order, held_keys)[1]
+    # One call a group; what else there is to write is values.
     for index, members in _by_group(indices[held_row[stale]], held_group[stale]):
         obj.vertex_groups[index].remove(members)
     for index, members in _by_group(indices[row[missing]], group[missing]):
         obj.vertex_groups[index].add(members, 1.0, "REPLACE")
-    _set_weights(mesh, indices, row, group, rows.values)
-    mesh.update()
+    return True
 
 
 def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.VertexGroup]:
@@ -117,14 +144,13 @@ def _stored(name: str) -> str:
 
 
 def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
-    """Row in `indices`, group index and weight of every membership of these vertices, in stored order."""
+    """Every membership of these vertices."""
     array = deform_array.open_array(mesh, indices)
-    return _from_array(array) if array else _from_api(mesh, indices)
-
-
-def _from_array(array: deform_array.DeformArray) -> Memberships:
+    if array is None:
+        return _from_api(mesh, indices)
     counts = np.diff(array.indptr)
-    return np.repeat(np.arange(len(counts)), counts), array.groups().astype(np.int64), array.weights()
+    row = np.repeat(np.arange(len(counts)), counts)
+    return Memberships(row, array.groups().astype(np.int64), array.weights(), array)
 
 
 def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
@@ -138,26 +164,26 @@ def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships
             groups.append(member.group)
             values.append(member.weight)
     row = np.repeat(np.arange(len(indices)), np.array(counts, np.int64))
-    return row, np.array(groups, np.int64), np.array(values, np.float32)
+    return Memberships(row, np.array(groups, np.int64), np.array(values, np.float32))
 
 
 def _set_weights(
     mesh: bpy.types.Mesh,
     indices: NDArray[np.integer],
+    held: Memberships,
     row: NDArray[np.int64],
     group: NDArray[np.int64],
     values: NDArray[np.float32],
 ) -> None:
     """Give memberships that exist already, (row in `indices`, group), their values."""
-    array = deform_array.open_array(mesh, indices)
-    held_row, held_group, now = _from_array(array) if array else _from_api(mesh, indices)
     order = np.argsort(_keys(row, group), kind="stable")
-    position, found = _find(_keys(row, group)[order], _keys(held_row, held_group))
+    position, found = _find(_keys(row, group)[order], _keys(held.row, held.group))
+    now = held.values.copy()
     now[found] = values[order[position[found]]]
-    if array:
-        array.set_weights(now)
+    if held.array:
+        held.array.set_weights(now)
         return
-    ends = np.cumsum(np.bincount(held_row, minlength=len(indices)))
+    ends = np.cumsum(np.bincount(held.row, minlength=len(indices)))
     for r in np.unique(row).tolist():
         start = ends[r - 1] if r else 0
         mesh.vertices[indices[r]].groups.foreach_set("weight", now[start : ends[r]])
