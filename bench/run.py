@@ -112,7 +112,7 @@ def measure(name: str, size: str) -> dict:
 
 
 def measure_operator(python: str, sizes: list[str]) -> list[str]:
-    """Lines of Markdown about the operator in the Blender of this Python, for the sizes that an artist would wait for."""
+    """A table of the operator in the Blender of this Python, for the sizes that an artist would wait for."""
     command = [python, str(HERE / "operator_wall.py"), *(size for size in sizes if size in OPERATOR_SIZES)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
     if done.returncode != 0:

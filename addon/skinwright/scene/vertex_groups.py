@@ -176,10 +176,13 @@ def _set_weights(
     values: NDArray[np.float32],
 ) -> None:
     """Give memberships that exist already, (row in `indices`, group), their values."""
-    order = np.argsort(_keys(row, group), kind="stable")
-    position, found = _find(_keys(row, group)[order], _keys(held.row, held.group))
-    now = held.values.copy()
-    now[found] = values[order[position[found]]]
+    if np.array_equal(held.row, row) and np.array_equal(held.group, group):
+        now = values  # a garment without other groups, as it is after the first transfer
+    else:
+        order = np.argsort(_keys(row, group), kind="stable")
+        position, found = _find(_keys(row, group)[order], _keys(held.row, held.group))
+        now = held.values.copy()
+        now[found] = values[order[position[found]]]
     if held.array:
         held.array.set_weights(now)
         return
@@ -191,7 +194,9 @@ def _set_weights(
 
 def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator[tuple[int, list[int]]]:
     """Each group's index with its vertices."""
-    order = np.argsort(group, kind="stable")
+    # NumPy sorts 16 bits by digits, six times as fast.
+    small = group.astype(np.uint16) if group.max(initial=0) < 1 << 16 else group
+    order = np.argsort(small, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
         if members.size:
             yield int(group[members[0]]), vertex[members].tolist()
