@@ -5,7 +5,7 @@ use pulp::Arch;
 use super::blocks::BLOCK;
 use super::buffer::Buffer;
 use super::kernels::Backward;
-use super::solve::{FORK, PIVOT_BLOCKS, row_blocks};
+use super::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
 use super::tree::{Front, Tree};
 use super::walk::BRANCHES;
 

@@ -6,6 +6,8 @@
 
 /// Rows of a block: one cache line.
 pub(super) const BLOCK: usize = 8;
+/// Work on the row blocks of one front (multiplications) worth a second thread.
+pub(super) const FORK: usize = 1 << 21;
 
 /// Length of a lower triangle of `blocks` full row blocks, and so where row block `blocks` starts.
 pub(super) fn triangle_len(blocks: usize) -> usize {
@@ -38,4 +40,17 @@ pub(super) fn panel_index(columns: usize, row: usize, column: usize) -> usize {
         let below = row - columns;
         diagonal_len(columns) + below / BLOCK * BLOCK * columns + BLOCK * column + below % BLOCK
     }
+}
+
+/// Splits `count` row blocks from `first` on, each as long as its number but no longer than `most`, into halves of about
+/// the same work; whole groups of three.
+pub(super) fn middle_row(first: usize, count: usize, most: usize) -> usize {
+    let tenths = if first >= most {
+        5
+    } else if first == 0 {
+        7
+    } else {
+        6
+    };
+    (count * tenths / 10 / 3 * 3).max(3)
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::bisection::{Plane, Point, halve, principal_axes};
 use super::graph::Graph;
-use super::patch::{self, Patch, first_where};
+use super::patch::{self, Node, Patch, first_where};
 use super::vertex_cover::minimum_vertex_cover;
 
 /// Sets above this size are cut on two threads.
@@ -16,15 +16,6 @@ const FORK: usize = 4096;
 const TRY_AXES: usize = 8192;
 /// A separator that takes more than this share of a set larger than [`FORK`] tells that positions do not follow the graph.
 const POOR: f64 = 0.3;
-
-/// A node of the elimination tree: a separator or a leaf, all of it eliminated after its descendants.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Node {
-    /// Number of unknowns.
-    pub(super) columns: usize,
-    /// Number of nodes under this one; they come right before it.
-    pub(super) descendants: usize,
-}
 
 /// An elimination order with its tree, nodes in post-order.
 pub(super) struct Dissection {

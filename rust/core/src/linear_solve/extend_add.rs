@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use pulp::Arch;
 
-use super::blocks::BLOCK;
-use super::factor::{FORK, middle_row};
+use super::blocks::{BLOCK, FORK, middle_row};
 use super::kernels::{AddRuns, Run};
 
 /// Adds the children's updates to the row blocks of the parent's update from `first` on.

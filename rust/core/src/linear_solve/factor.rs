@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use pulp::Arch;
 
-use super::blocks::{BLOCK, panel_index};
+use super::blocks::{BLOCK, FORK, middle_row, panel_index};
 use super::buffer::Buffer;
 use super::extend_add::{Child, add_children};
 use super::graph::Graph;
@@ -14,8 +14,6 @@ use super::tree::{Front, Tree};
 use super::walk::{Plan, Received, Visit, walk};
 use super::{NotPositive, pivot_floor};
 
-/// Work of a front (multiplications) worth a second thread.
-pub(super) const FORK: usize = 1 << 21;
 /// Block columns that are eliminated on one thread before all threads use them on the rows below.
 const PIVOT_BLOCKS: usize = 16;
 
@@ -174,19 +172,6 @@ fn eliminate(arch: Arch, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks:
     } else {
         arch.dispatch(Eliminate { pivots, rows, first: blocks.start, last: blocks.end, columns });
     }
-}
-
-/// Splits `count` row blocks from `first` on, each as long as its number but no longer than `most`, into halves of about
-/// the same work; whole groups of three.
-pub(super) fn middle_row(first: usize, count: usize, most: usize) -> usize {
-    let tenths = if first >= most {
-        5
-    } else if first == 0 {
-        7
-    } else {
-        6
-    };
-    (count * tenths / 10 / 3 * 3).max(3)
 }
 
 /// The row blocks of a panel, those of its triangle first.

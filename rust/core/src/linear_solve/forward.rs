@@ -8,7 +8,7 @@ use pulp::Arch;
 use super::blocks::BLOCK;
 use super::buffer::Buffer;
 use super::kernels::{Apply, Forward};
-use super::solve::{Columns, FORK, PIVOT_BLOCKS, row_blocks};
+use super::substitution::{Columns, FORK, PIVOT_BLOCKS, row_blocks};
 use super::tree::{Front, Tree};
 use super::walk::{Plan, Received, Visit, walk};
 

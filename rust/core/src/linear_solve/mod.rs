@@ -2,8 +2,8 @@
 //!
 //! The way: `dissection` orders the unknowns by cutting the point cloud in half again and again (`bisection`, `patch`,
 //! `vertex_cover`); `tree` finds the rows of each front; `factor` works through the fronts, children first (`walk`), with
-//! `kernels` on memory laid out in row blocks (`blocks`, `buffer`), children's updates added by `extend_add`; `solve` goes
-//! `forward` and `backward` through the same tree. `multifrontal` keeps it together, and `accuracy` measures every solution.
+//! `kernels` on memory laid out in row blocks (`blocks`, `buffer`), children's updates added by `extend_add`; the substitution
+//! goes `forward` and `backward` through the same tree. `multifrontal` keeps it together, and `accuracy` measures every solution.
 //!
 //! What limits it: the factor is bound by arithmetic (at a million unknowns 1e11 operations against 2 GB), a solve for 60
 //! bones too (four operations per entry of the factor and bone, 240 for the 16 bytes that the two passes read), a solve for
@@ -32,7 +32,7 @@ mod kernels;
 mod multifrontal;
 mod patch;
 mod solution;
-mod solve;
+mod substitution;
 mod supernodal;
 mod tree;
 mod vertex_cover;

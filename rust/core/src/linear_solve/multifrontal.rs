@@ -3,13 +3,15 @@
 use glam::Vec3;
 use pulp::Arch;
 
+use super::backward::backward;
 use super::blocks::BLOCK;
 use super::buffer::Buffer;
 use super::dissection::dissect;
 use super::factor::factor;
+use super::forward::forward;
 use super::graph::Graph;
 use super::solution::{Part, RightHandSides, Solution};
-use super::solve::{Columns, solve};
+use super::substitution::Columns;
 use super::tree::Tree;
 use super::{NotPositive, SymmetricMatrix};
 
@@ -48,7 +50,9 @@ impl Multifrontal {
             let count = (rhs.columns - first).min(TOGETHER);
             let width = count.next_multiple_of(BLOCK);
             let mut values = Buffer::zeroed(rhs.size() * width);
-            solve(&self.tree, &self.panels, self.arch, Columns { rhs, first, count, width }, &mut values);
+            let columns = Columns { rhs, first, count, width };
+            forward(&self.tree, &self.panels, self.arch, columns, &mut values);
+            backward(&self.tree, &self.panels, self.arch, width, &mut values);
             Part { values, width, count }
         };
         let parts = (0..rhs.columns).step_by(TOGETHER).map(part).collect();

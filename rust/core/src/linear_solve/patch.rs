@@ -1,7 +1,15 @@
 //! Nested dissection of a set so small that its couplings fit in a few words each.
 
 use super::bisection::{Point, halve, principal_axes};
-use super::dissection::Node;
+
+/// A node of the elimination tree: a separator or a leaf, all of it eliminated after its descendants.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node {
+    /// Number of unknowns.
+    pub(super) columns: usize,
+    /// Number of nodes under this one; they come right before it.
+    pub(super) descendants: usize,
+}
 
 /// Most points of a patch.
 pub(super) const MOST: usize = 512;

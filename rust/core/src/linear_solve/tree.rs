@@ -1,8 +1,9 @@
 //! The elimination tree with the rows of every front: what the numbers will need, before any number is touched.
 
 use super::blocks::{panel_len, update_len};
-use super::dissection::{Dissection, Node};
+use super::dissection::Dissection;
 use super::graph::Graph;
+use super::patch::Node;
 
 /// A dense piece of the elimination: some columns of the factor and the rows they touch.
 #[derive(Debug)]

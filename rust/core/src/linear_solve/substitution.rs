@@ -1,24 +1,15 @@
-//! Substitution through the tree, all right-hand sides at once: forward from the leaves, backward from the root.
+//! What the two ways of substitution through the tree share, forward from the leaves and backward from the root.
 
-use pulp::Arch;
 use rayon::prelude::*;
 
-use super::backward::backward;
 use super::blocks::{BLOCK, panel_len};
-use super::forward::forward;
 use super::solution::RightHandSides;
-use super::tree::{Front, Tree};
+use super::tree::Front;
 
 /// Work of a front (multiplications) worth a second thread.
 pub(super) const FORK: usize = 1 << 19;
 /// Row blocks solved on one thread before the rest makes use of them.
 pub(super) const PIVOT_BLOCKS: usize = 16;
-
-/// Solves for some right-hand sides; `x` (n, width), all zero, is filled in elimination order.
-pub(super) fn solve(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) {
-    forward(tree, panels, arch, columns, x);
-    backward(tree, panels, arch, columns.width, x);
-}
 
 /// Some columns of `rhs`: at most 64 (one bit each in a word), `count` from `first` on.
 #[derive(Clone, Copy)]
