@@ -5,7 +5,6 @@ changes the weights of these vertices such that the pose shows what was sculpted
 name each time, as Blender's undo replaces it.
 """
 
-import time
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -44,11 +43,10 @@ class SculptOptions:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A stroke: how many vertices it moved, how much of it weights reach, and what took how long."""
+    """A stroke: how many vertices it moved, and how much of it weights reach."""
 
     vertices: int
     reachability: float
-    seconds: dict[str, float]
 
 
 # The session of the modal operator.
@@ -112,14 +110,15 @@ class SculptSession:
 
         The rest positions are back in any case. Raises SceneError or native.NativeError with the weights as they were.
         """
-        obj, start = self._found(), time.perf_counter()
+        obj = self._found()
         vertices, moved = rest_shape.moved(obj, self._shape)
         if not vertices.size:
             return None
-        seconds = {"look": time.perf_counter() - start}
         try:
+            if np.abs(moved - self._shape.positions[vertices]).max() <= self._shape.rounding:
+                return None
             self._enter_pose(obj)
-            return self._solve(obj, vertices, self._solver.posed(vertices, moved), seconds)
+            return self._solve(obj, vertices, self._solver.posed(vertices, moved))
         finally:
             rest_shape.restore(obj, self._shape)
             obj.data.update()
@@ -128,7 +127,7 @@ class SculptSession:
         """The same for vertices (n,) that are to be at `positions` (n, 3, the mesh' space) in the present pose."""
         obj = self._found()
         self._enter_pose(obj)
-        outcome = self._solve(obj, vertices, positions, {})
+        outcome = self._solve(obj, vertices, positions)
         obj.data.update()
         return outcome
 
@@ -143,17 +142,14 @@ class SculptSession:
         if number not in self._rotations:
             self._rotations[number] = armature.local_rotations(rig)
 
-    def _solve(self, obj: bpy.types.Object, vertices: NDArray, targets: NDArray, seconds: dict[str, float]) -> Outcome:
-        start = time.perf_counter()
+    def _solve(self, obj: bpy.types.Object, vertices: NDArray, targets: NDArray) -> Outcome:
         if self.options.guard == "RANGE":
             self._guard_joints(obj, vertices)
         del self._reached[self.stroke_count :]
         rows, reachability, _ = self._solver.stroke(vertices, targets)
         self._reached.append(reachability)
-        solved = time.perf_counter()
         vertex_groups.write(obj, self.names, rows, vertices)
-        seconds = seconds | {"solve": solved - start, "write": time.perf_counter() - solved}
-        return Outcome(len(vertices), reachability, seconds)
+        return Outcome(len(vertices), reachability)
 
     def _guard_joints(self, obj: bpy.types.Object, vertices: NDArray) -> None:
         """The joints that a stroke touches for the first time."""

@@ -39,13 +39,25 @@ class Blender:
         """The path as Blender sees it."""
         return "/" + str(path.relative_to(self.tree)) if self.tree else str(path)
 
-    def run(self, script: str, *arguments: str, timeout: float = 150.0, size: tuple[int, int] = (1000, 700)) -> dict:
-        """Runs `in_blender/<script>.py` in a window and returns its record; fails the test with the log otherwise."""
+    def run(
+        self,
+        script: str,
+        *arguments: str,
+        timeout: float = 150.0,
+        size: tuple[int, int] = (1000, 700),
+        real_mouse: bool = False,
+    ) -> dict:
+        """Runs `in_blender/<script>.py` in a window and returns its record; fails the test with the log otherwise.
+
+        Blender takes either simulated events or those of the virtual screen (`real_mouse`, in_blender/mouse.py).
+        """
         parent = self.tree / "tmp" if self.tree else None
         with tempfile.TemporaryDirectory(prefix="skinwright-", dir=parent) as folder, self.screen(size) as display:
             share = Path(folder)
             lay_out(share)
-            flags = ["--factory-startup", "--enable-event-simulate", "--python-exit-code", "9"]
+            flags = ["--factory-startup", "--python-exit-code", "9"]
+            if not real_mouse:
+                flags.append("--enable-event-simulate")
             window = ["-p", "0", "0", str(size[0]), str(size[1])]
             start = ["-P", self.inside(share / "in_blender" / f"{script}.py"), "--", *arguments]
             done = subprocess.run(

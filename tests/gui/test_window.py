@@ -19,3 +19,9 @@ def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
     seen = blender.run("sculpt_weights", timeout=300, size=(1000, 900))
     assert seen["strokes"] == 2
     assert 0 < seen["reachability"] <= 1
+
+
+def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
+    seen = blender.run("sculpt_release", timeout=200, size=(640, 480), real_mouse=True)
+    assert seen["brush down"] > 0
+    assert seen["brush up"] == []

@@ -116,6 +116,16 @@ def test_a_stroke_becomes_weights_and_the_rest_shape_stays(sculpt, body):
     assert session.stroke() is None
 
 
+def test_a_cancelled_brush_is_no_stroke(sculpt, body):
+    """It leaves rounding behind."""
+    session = sculpt.SculptSession(body)
+    before = state(body)
+    brush(body, range(30, 40), (1e-7, 0, 0))
+    assert state(body) != before
+    assert session.stroke() is None
+    assert session.stroke_count == 0 and state(body) == before
+
+
 def test_targets_within_reach_are_reached_in_every_pose(sculpt, body, rig):
     """Blender's own evaluation is the judge."""
     weights = goal_weights(body)

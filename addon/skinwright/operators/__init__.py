@@ -7,6 +7,7 @@ from . import (
     paint_match_mask,
     presets,
     preview_match,
+    sculpt_keys,
     sculpt_weights,
     timers,
     transfer_weights,
@@ -21,5 +22,6 @@ MODULES = (
     paint_match_mask,
     check_weights,
     desparsify,
+    sculpt_keys,
     sculpt_weights,
 )

@@ -8,7 +8,7 @@ from .. import match_session, native, preferences
 from ..mask_painting import MaskPainting
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
-from . import timers
+from . import held_input, timers
 from .preview_match import refusal, target
 
 TICK_SECONDS = 0.02
@@ -60,7 +60,7 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
             return self._end(context, keep=False)
         if pressed in ("RET", "NUMPAD_ENTER") or cls.asked_to_end == "KEEP":
             return self._end(context, keep=True)
-        if event.type == "TIMER" and not _busy(context):
+        if event.type == "TIMER" and not held_input.by_another(context, cls):
             self._tick(context)
         return {"PASS_THROUGH"}
 
@@ -111,13 +111,6 @@ class SKINWRIGHT_OT_end_match_mask(Operator):
 
 def _params(context: Context) -> TransferParams:
     return context.scene.skinwright.transfer.to_params(preferences.threads(context))
-
-
-def _busy(context: Context) -> bool:
-    """Whether a brush or another operator holds the input."""
-    windows = context.window_manager.windows
-    names = {operator.bl_idname for window in windows for operator in window.modal_operators}
-    return bool(names - {"SKINWRIGHT_OT_paint_match_mask"})
 
 
 CLASSES = (SKINWRIGHT_OT_paint_match_mask, SKINWRIGHT_OT_end_match_mask)

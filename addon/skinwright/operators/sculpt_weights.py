@@ -5,16 +5,20 @@ something has changed while no other operator holds the input, and the session l
 """
 
 import bpy
-from bpy.props import BoolProperty
-from bpy.types import Context, Event, Object, Operator
+from bpy.types import Context, Event, Operator
 
-from .. import native, preferences, sculpt_session
-from ..scene import changes, mesh, sculpting
+from .. import native, sculpt_session
+from ..scene import mesh
 from ..scene.error import SceneError
 from ..sculpt_session import SculptSession
-from . import sculpt_undo
+from . import held_input, sculpt_begin, sculpt_keys, sculpt_undo, timers
+from .sculpt_watch import StrokeWatch
 
-TICK_SECONDS = 0.02
+# As long as Blender's main loop sleeps when nothing happens. With a timer that is no slower, whatever wakes the loop
+# finds the timer due as well: its event follows the release in one queue, and weights are written before Blender
+# evaluates and draws. A timer of 20 ms came after the drawing in 13 strokes of 22, and so long the view showed what
+# the brush had made of the shape at rest.
+TICK_SECONDS = 0.005
 # While posing between strokes, Object and Pose mode belong to the session too.
 MODES = {"SCULPT", "OBJECT", "POSE"}
 
@@ -27,36 +31,30 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
     bl_description = "Sculpt the posed mesh; every stroke becomes weights, and the rest shape stays"
     bl_options = {"REGISTER", "UNDO"}
 
-    asked_to_end = ""
     _session: SculptSession
+    _watch: StrokeWatch
 
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Cheap, as it runs on every redraw."""
-        reason = _refusal(context)
+        reason = sculpt_begin.refusal(context)
         cls.poll_message_set(reason)
         return not reason
 
     def invoke(self, context: Context, _event: Event) -> set[str]:
         """Begin, in Sculpt mode; without a window there is nothing to sculpt with."""
-        obj, self._mode = context.object, context.object.mode
+        self._mode = context.object.mode
         try:
-            sculpting.check(obj)
-            if obj.mode != "SCULPT":
-                bpy.ops.object.mode_set(mode="SCULPT")
-            sculpt_undo.mark(obj)
-            self._session = sculpt_session.current = SculptSession(obj, _options(context))
+            self._session = sculpt_session.current = sculpt_begin.begin(context)
         except (SceneError, native.NativeError) as error:
-            if obj.mode != self._mode:
-                bpy.ops.object.mode_set(mode=self._mode)
+            sculpt_begin.go_to(context, self._mode)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        SKINWRIGHT_OT_sculpt_weights.asked_to_end = ""
+        sculpt_keys.forget()
+        self._watch = StrokeWatch(self._session)
         self._steps_to_undo, self._left = False, False
-        self._seen, self._undone = changes.version, changes.undone
-        window_manager = context.window_manager
-        self._timer = window_manager.event_timer_add(TICK_SECONDS, window=context.window)
-        window_manager.modal_handler_add(self)
+        self._timer = timers.start(context, TICK_SECONDS)
+        context.window_manager.modal_handler_add(self)
         _show(context, "sculpt, and the weights follow")
         return {"RUNNING_MODAL"}
 
@@ -67,31 +65,26 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
             self.cancel(context)
             self.report({"WARNING"}, f"{session.target_name} or its armature is gone: sculpting has ended")
             return {"CANCELLED"}
-        asked = SKINWRIGHT_OT_sculpt_weights.asked_to_end or _asked_by(event, context, obj)
+        asked = sculpt_keys.asked(event, context, obj)
         if asked in ("KEEP", "CANCEL") or context.mode not in MODES:
             return self._end(context, keep=asked != "CANCEL")
         self._left = self._left or context.mode != "SCULPT"
-        if context.mode == "SCULPT" and context.object == obj and not _busy(context):
-            if asked:
-                self._step(context, asked)
-                return {"RUNNING_MODAL"}
-            if event.value != "PRESS":
-                self._look(context)
+        if context.mode != "SCULPT" or context.object != obj:
+            return {"PASS_THROUGH"}
+        held = held_input.by_another(context, type(self))
+        if asked and not held:
+            self._step(context, asked)
+            return {"RUNNING_MODAL"}
+        if held or event.value == "PRESS":
+            self._watch.expect_stroke()
+        else:
+            self._look(context)
         return {"PASS_THROUGH"}
 
     def _look(self, context: Context) -> None:
         """Turn into weights what has moved since the last look."""
-        session = self._session
-        if self._seen == changes.version:
-            return
-        self._seen = changes.version
         try:
-            if self._undone != changes.undone:
-                # Blender's own undo, from its menu: the weights it has brought back are not the session's.
-                self._undone = changes.undone
-                session.assert_state()
-            session.set_strength(context.scene.skinwright.sculpt.kappa)
-            outcome = session.stroke()
+            outcome = self._watch.look(context.scene.skinwright.sculpt.kappa)
         except (SceneError, native.NativeError) as error:
             self._steps_to_undo = True
             self.report({"WARNING"}, str(error))
@@ -103,10 +96,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
     def _step(self, context: Context, asked: str) -> None:
         session = self._session
         done = session.undo() if asked == "UNDO" else session.redo()
-        if done:
-            _show(context, f"{session.stroke_count} strokes")
-        else:
-            _show(context, f"nothing to {asked.lower()}")
+        _show(context, f"{session.stroke_count} strokes" if done else f"nothing to {asked.lower()}")
 
     def _end(self, context: Context, keep: bool) -> set[str]:
         session = self._session
@@ -122,8 +112,8 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
                 self._keep(session) if keep else session.cancel()
         if not keep:
             self.report({"INFO"}, "Weights and shape are as they were")
-        if context.mode == "SCULPT" and self._mode != "SCULPT":
-            bpy.ops.object.mode_set(mode=self._mode)
+        if context.mode == "SCULPT":
+            sculpt_begin.go_to(context, self._mode)
         return {"FINISHED" if keep else "CANCELLED"}
 
     def _keep(self, session: SculptSession) -> None:
@@ -136,82 +126,26 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits: then there is nothing to restore."""
         sculpt_session.current = None
-        context.window_manager.event_timer_remove(self._timer)
+        timers.stop(self._timer)
         if context.workspace:
             context.workspace.status_text_set(None)
-
-
-class SKINWRIGHT_OT_end_sculpt_weights(Operator):
-    """The panel's buttons for Enter and Esc."""
-
-    bl_idname = "skinwright.end_sculpt_weights"
-    bl_label = "End Sculpting Weights"
-    bl_description = "Stop sculpting weights"
-    bl_options = {"INTERNAL"}
-
-    keep: BoolProperty(name="Keep", description="Keep the new weights, or bring back those before", default=True)
-
-    @classmethod
-    def poll(cls, _context: Context) -> bool:
-        """While weights are sculpted."""
-        return sculpt_session.current is not None
-
-    def execute(self, _context: Context) -> set[str]:
-        """The sculpting operator ends itself."""
-        SKINWRIGHT_OT_sculpt_weights.asked_to_end = "KEEP" if self.keep else "CANCEL"
-        return {"FINISHED"}
-
-
-def _asked_by(event: Event, context: Context, obj: Object) -> str:
-    """What a key asks for; only in Sculpt mode, as posing has its own undo."""
-    if event.value != "PRESS" or context.mode != "SCULPT" or context.object != obj:
-        return ""
-    if event.type == "Z" and (event.ctrl or event.oskey):
-        return "REDO" if event.shift else "UNDO"
-    return {"RET": "KEEP", "NUMPAD_ENTER": "KEEP", "ESC": "CANCEL"}.get(event.type, "")
-
-
-def _options(context: Context) -> sculpt_session.SculptOptions:
-    return context.scene.skinwright.sculpt.to_options(preferences.threads(context))
-
-
-def _busy(context: Context) -> bool:
-    """Whether a brush or another operator holds the input."""
-    windows = context.window_manager.windows
-    names = {operator.bl_idname for window in windows for operator in window.modal_operators}
-    return bool(names - {SKINWRIGHT_OT_sculpt_weights.__name__})
 
 
 def _show(context: Context, news: str) -> None:
     keys = "Ctrl Z: back   Ctrl Shift Z: again   Enter: keep   Esc: as it was"
     context.workspace.status_text_set(f"Sculpt Weights: {news}   {keys}")
-    for area in context.screen.areas:
-        if area.type == "VIEW_3D":
-            area.tag_redraw()
-
-
-def _refusal(context: Context) -> str:
-    if native.problem():
-        return native.problem()
-    if sculpt_session.current:
-        return "Weights are being sculpted"
-    if context.mode not in {"OBJECT", "SCULPT"}:
-        return "Go to Object or Sculpt mode to sculpt weights"
-    if context.object is None or context.object.type != "MESH":
-        return "Make the skinned mesh the active object"
-    return ""
-
-
-CLASSES = (SKINWRIGHT_OT_sculpt_weights, SKINWRIGHT_OT_end_sculpt_weights)
+    # The panel; what has changed in the view Blender sees for itself.
+    for region in (region for area in context.screen.areas if area.type == "VIEW_3D" for region in area.regions):
+        if region.type == "UI":
+            region.tag_redraw()
 
 
 def register() -> None:
-    """Register the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    """Register the operator."""
+    bpy.utils.register_class(SKINWRIGHT_OT_sculpt_weights)
 
 
 def unregister() -> None:
-    """Unregister them."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    """Unregister it; a session that goes on is ended by Blender and keeps what it has."""
+    sculpt_session.current = None
+    bpy.utils.unregister_class(SKINWRIGHT_OT_sculpt_weights)

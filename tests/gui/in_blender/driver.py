@@ -92,6 +92,19 @@ class Window:
         self.area.tag_redraw()
         yield 0.4
 
+    def at_rest(self) -> Steps:
+        """Until the view has not been drawn for a while: then Blender's loop sleeps between its timers."""
+        drawings, seen = [0], -1
+
+        def count() -> None:
+            drawings[0] += 1
+
+        handle = bpy.types.SpaceView3D.draw_handler_add(count, (), "WINDOW", "POST_PIXEL")
+        while seen != drawings[0]:
+            seen = drawings[0]
+            yield 0.6
+        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+
     def screenshot(self, name: str) -> Steps:
         for area in self.window.screen.areas:
             area.tag_redraw()

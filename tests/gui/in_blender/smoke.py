@@ -8,6 +8,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import bpy
 import dress
 from driver import EXTENSION, Steps, Window, disable, enable, record, start
+from sculpting import begin, character, session
 
 
 def left_behind() -> dict[str, list[str]]:
@@ -47,6 +48,14 @@ def steps(window: Window) -> Steps:
     yield 0.3
     assert left_behind() == before, "disabling while the mask is painted leaves something behind"
     enable()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    character(window, 400)
+    yield from begin(window)
+    disable()
+    yield 0.3
+    assert left_behind() == before, "disabling while weights are sculpted leaves something behind"
+    enable()
+    assert session() is None, "weights are still being sculpted"
     bpy.ops.object.mode_set(mode="OBJECT")
     yield from window.show_tab("Weights")
     yield from window.screenshot("panel")
