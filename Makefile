@@ -70,7 +70,7 @@ check: .venv/tests.stamp cargo
 	.venv/bin/mypy
 	$(MAKE) test
 
-## make bench      against the peers, in bench/results.md and .png; 25 minutes, or some sizes: make bench SIZES=5k,20k
+## make bench      against the peers, in bench/results.md and .png; half an hour, or some sizes: make bench SIZES=5k,20k
 SIZES := 5k,20k,100k,300k,1M
 bench: .venv/bench.stamp $(addsuffix /native.stamp,$(OTHER_VENVS))
 	.venv/bin/python bench/run.py --sizes $(SIZES) --blenders $(addsuffix /bin/python,.venv $(OTHER_VENVS))

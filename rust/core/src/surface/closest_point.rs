@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 /// The best of the three edges and, where the query projects into the triangle, of the plane. The projection uses `ab`
 /// and the part of `ac` perpendicular to it, so that its error stays at the rounding of the lengths themselves even for
 /// needles; the usual regions (Ericson, Real-Time Collision Detection, 5.1.5) divide by products that cancel. A
-/// vanished area leaves the edges. Branch-free: a loop over triangles that uses the distance alone becomes SIMD code.
+/// vanished area leaves the edges.
 #[inline(always)]
 pub(super) fn closest_to_origin([a, b, c]: [DVec3; 3]) -> ([f64; 3], f64) {
     let (ab, ac, bc) = (b - a, c - a, c - b);
@@ -35,7 +35,8 @@ pub(super) fn closest_to_origin([a, b, c]: [DVec3; 3]) -> ([f64; 3], f64) {
 }
 
 /// About the squared distance of the triangle from the origin, the same way in f32: at most `rounding` times the farthest
-/// corner's distance too long (see [`rounding`]), before it is squared.
+/// corner's distance too long (see [`rounding`]), before it is squared. Branch-free, so that a loop over triangles becomes
+/// SIMD code.
 #[inline(always)]
 pub(super) fn rough_squared_distance([a, b, c]: [Vec3; 3]) -> f32 {
     let positive = |squared_length: f32| squared_length.max(f32::MIN_POSITIVE);
