@@ -52,6 +52,8 @@ def keep_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
 
 def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
     """The same, with the kept columns numbered anew."""
+    if columns.all():
+        return rows
     kept = keep_columns(rows, columns)
     return kept._replace(bones=(np.cumsum(columns) - 1).astype(np.uint32)[kept.bones])
 
@@ -67,6 +69,8 @@ def keep_largest(rows: Rows, most: NDArray[np.integer]) -> Rows:
 
 def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
     """Rows over the `n_columns` columns of `left`, then those of `right`."""
+    if n_columns == 0:
+        return right
     vertex = np.concatenate([entry_vertices(left), entry_vertices(right)])
     order = np.argsort(vertex, kind="stable")
     bones = np.concatenate([left.bones, right.bones + np.uint32(n_columns)])

@@ -75,7 +75,7 @@ def wait(steps: Jobs[T]) -> T:
     watch = _print_progress() if bpy.app.background else None
     while not runner.poll():
         # Short work is not made to wait for the next look at it.
-        time.sleep(min(0.1, 0.0005 + 0.05 * (time.perf_counter() - started)))
+        time.sleep(min(0.1, 0.0005 + 0.02 * (time.perf_counter() - started)))
         if watch:
             watch(runner.progress)
     return runner.result

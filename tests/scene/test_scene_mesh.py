@@ -45,6 +45,26 @@ def test_polygons_become_triangles(mesh):
     assert normals(geometry)[:, 2].sum() / 2 == pytest.approx(5)
 
 
+@pytest.mark.parametrize(
+    "faces",
+    [
+        [(0, 1, 2), (3, 2, 1)],
+        [(0, 1, 3, 2)],
+        [(0, 1, 2), (1, 4, 3, 2)],
+        [(0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (3, 4, 2)],
+    ],
+    ids=["triangles", "a quad", "both", "mostly triangles"],
+)
+def test_triangles_are_blenders(mesh, faces):
+    obj = builders.mesh("Faces", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 1)], faces)
+    obj.data.calc_loop_triangles()
+    wanted = [list(triangle.vertices) for triangle in obj.data.loop_triangles]
+    assert mesh.triangles(obj).tolist() == wanted
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert mesh.triangles(obj).tolist() == wanted
+
+
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, 1, -2), (-1, -3, -1)])
 def test_mirrored_objects_keep_their_outside(mesh, scale):
     bpy.ops.mesh.primitive_cube_add()

@@ -78,7 +78,8 @@ def garment_warnings(body: Body, garment: Garment, params: TransferParams) -> li
 def _alignment(body: Body, garment: Garment) -> str:
     a, b = body.geometry, garment.geometry
     diagonal = float(np.linalg.norm(a.size))
-    gap = np.maximum(a.positions.min(0) - b.positions.max(0), b.positions.min(0) - a.positions.max(0)).max()
+    (a_low, a_high), (b_low, b_high) = a.bounds, b.bounds
+    gap = np.maximum(a_low - b_high, b_low - a_high).max()
     if gap > 0.05 * diagonal or not 0.02 * diagonal < np.linalg.norm(b.size) < 3 * diagonal:
         return f"{garment.object.name} and {body.object.name} hardly overlap: are they aligned and of one scale?"
     return ""
