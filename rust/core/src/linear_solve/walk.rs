@@ -6,7 +6,7 @@ use super::tree::{Front, Tree};
 /// each thread has this number to choose from: each branch has work space of its own, and touching memory for the first
 /// time costs as much as the arithmetic.
 const FORK: f64 = 2e6;
-pub(super) const BRANCHES: usize = 16;
+pub(super) const BRANCHES: usize = 8;
 
 /// What a walk does at each front.
 pub(super) trait Visit: Sync {
