@@ -1,11 +1,14 @@
-//! The Python module `skinwright_native`: one file per operation, and this list.
+//! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
 mod desparsify;
 mod error;
+mod inpainting;
 mod job;
 mod sculpt;
+mod settings;
 mod skinning;
+mod source;
 mod transfer;
 mod weights;
 
@@ -21,13 +24,17 @@ mod skinwright_native {
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
     };
     #[pymodule_export]
+    use crate::inpainting::Inpainting;
+    #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
     use crate::skinning::linear_blend;
     #[pymodule_export]
-    use crate::transfer::{Inpainting, Source, Transfer, transfer_weights};
+    use crate::source::{Source, transfer_weights};
+    #[pymodule_export]
+    use crate::transfer::Transfer;
     #[pymodule_export]
     use crate::weights::Weights;
     use pyo3::prelude::*;

@@ -1,0 +1,134 @@
+//! Transfer in steps: `Inpainting`, whose parts are kept while settings and masks change.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use skinwright_core::Progress;
+use skinwright_core::transfer as core;
+
+use crate::arrays::{Matrix, read_only, triples};
+use crate::error::enter;
+use crate::job::Job;
+use crate::settings::keywords;
+use crate::source::Source;
+use crate::transfer::{Closest, Transfer};
+use crate::weights::Weights;
+
+/// Unknowns (U,) and their solution (U, n_bones).
+type RawWeights<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
+
+/// A body and a garment prepared for solving again and again: closest points are found once, a block of the system is
+/// factored again only when its own unknowns or the smoothness length change.
+#[pyclass(frozen, module = "skinwright_native")]
+pub struct Inpainting {
+    core: Arc<Mutex<core::Inpainting>>,
+    closest: Arc<Closest>,
+    islands: Py<PyArray1<u32>>,
+    threads: usize,
+}
+
+impl Inpainting {
+    /// Runs `work` on the prepared target with the GIL freed; waits for a job that holds it.
+    fn enter<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut core::Inpainting) -> skinwright_core::Result<T> + Send,
+    ) -> PyResult<T> {
+        enter(py, self.threads, || work(&mut lock(&self.core)))
+    }
+}
+
+/// A panic while solving leaves only kept blocks behind, and those are whole: a poisoned lock may be used on.
+fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting> {
+    inpainting.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[pymethods]
+impl Inpainting {
+    #[new]
+    #[pyo3(signature = (source, target_positions, target_triangles, *, threads=0))]
+    fn new(
+        py: Python<'_>,
+        source: &Source,
+        target_positions: Matrix<'_, f32>,
+        target_triangles: Matrix<'_, u32>,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let positions = triples(&target_positions, "target_positions")?;
+        let triangles = triples(&target_triangles, "target_triangles")?;
+        let source = source.core.clone();
+        let core = enter(py, threads, || core::Inpainting::new(source, positions, triangles, &Progress::default()))?;
+        let closest = Arc::new(Closest::of(py, &core)?);
+        let islands = read_only(py, core.islands().of_vertex().to_vec())?;
+        Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, threads })
+    }
+
+    /// Distance of each vertex to its closest source point (V,), world units.
+    #[getter]
+    fn distance(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
+        self.closest.distance.clone_ref(py)
+    }
+
+    /// Angle between the normals there (V,), radians, NaN where a normal is missing.
+    #[getter]
+    fn angle(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
+        self.closest.angle.clone_ref(py)
+    }
+
+    /// Island of each vertex (V,), 4294967295 for a vertex that no triangle uses.
+    #[getter]
+    fn islands(&self, py: Python<'_>) -> Py<PyArray1<u32>> {
+        self.islands.clone_ref(py)
+    }
+
+    /// Gives the source other weights; nothing geometric is computed anew.
+    fn set_source_weights(&self, py: Python<'_>, weights: &Weights) -> PyResult<()> {
+        let weights = weights.to_core(py)?;
+        self.enter(py, |inpainting| inpainting.set_source_weights(weights))
+    }
+
+    /// Which vertices match (V,) under these settings; nothing is solved.
+    #[pyo3(signature = (**settings))]
+    fn matched<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let (settings, mask) = keywords(settings)?;
+        let matched = self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?;
+        Ok(PyArray1::from_vec(py, matched))
+    }
+
+    /// Solves under these settings, factoring only the blocks that changed.
+    #[pyo3(signature = (**settings))]
+    fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
+        let (settings, mask) = keywords(settings)?;
+        let solve =
+            |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
+        let transfer = self.enter(py, solve)?;
+        self.closest.present(py, transfer)
+    }
+
+    /// Starts `solve` on threads of its own.
+    #[pyo3(signature = (**settings))]
+    fn start(&self, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
+        let (settings, mask) = keywords(settings)?;
+        let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
+        let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
+        Ok(Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer))))
+    }
+
+    /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other
+    /// solvers.
+    #[pyo3(signature = (**settings))]
+    fn raw_weights<'py>(&self, py: Python<'py>, settings: Option<&Bound<'py, PyDict>>) -> PyResult<RawWeights<'py>> {
+        let (settings, mask) = keywords(settings)?;
+        let raw = self.enter(py, |inpainting| inpainting.raw_weights(mask.as_deref(), &settings))?;
+        let n_bones = raw.values.len().checked_div(raw.vertices.len()).unwrap_or(0);
+        let shape = [raw.vertices.len(), n_bones];
+        let values = PyArray1::from_vec(py, raw.values).reshape(shape)?;
+        Ok((PyArray1::from_vec(py, raw.vertices), values))
+    }
+}
