@@ -10,14 +10,18 @@ use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
-use super::node::{Leaf, Node, WIDTH, bounds};
+use super::flat::FlatTriangle;
+use super::node::{Corners, Node, WIDTH, bounds};
 
 /// The hierarchy.
 #[derive(Debug)]
 pub(super) struct Bvh {
     /// The patches, then the nodes above them.
     pub(super) nodes: Vec<Node>,
-    pub(super) leaves: Vec<Leaf>,
+    /// The triangles, eight a leaf, thrice: for f32, for f64, and their indices in the mesh.
+    pub(super) flat: Vec<FlatTriangle>,
+    pub(super) corners: Vec<Corners>,
+    pub(super) triangles: Vec<u32>,
     pub(super) root: u32,
 }
 
@@ -34,16 +38,14 @@ impl Bvh {
         let item = |&triangle: &u32| Item { centre: centre(corners_of(triangle)), triangle };
         let mut items: Vec<Item> = triangles.par_iter().map(item).collect();
         sort_into_leaves(&mut items);
-        let leaf = |items: &[Item]| {
-            let triangles: Vec<_> = items.iter().map(|i| (corners_of(i.triangle), i.triangle)).collect();
-            Leaf::new(&triangles)
-        };
-        let leaves: Vec<Leaf> = items.par_chunks(WIDTH).map(leaf).collect();
-        let patches = leaves.par_chunks(WIDTH).enumerate();
-        let mut nodes: Vec<Node> = patches.map(|(p, leaves)| Node::of_leaves(leaves, p * WIDTH)).collect();
-        let boxes: Vec<Aabb> = leaves.par_chunks(WIDTH).enumerate().map(|(p, leaves)| box_of(p, leaves)).collect();
+        let corners: Vec<Corners> = items.par_iter().map(|i| corners_of(i.triangle).map(|p| p.to_array())).collect();
+        let flat = items.par_iter().map(|i| FlatTriangle::new(corners_of(i.triangle))).collect();
+        let patches = || corners.par_chunks(WIDTH * WIDTH).enumerate();
+        let mut nodes: Vec<Node> = patches().map(|(p, patch)| Node::of_leaves(patch, p * WIDTH)).collect();
+        let boxes: Vec<Aabb> = patches().map(|(p, patch)| box_of(p, patch)).collect();
         let root = add_inner_nodes(&mut nodes, &boxes);
-        Self { nodes, leaves, root }
+        let triangles = items.iter().map(|i| i.triangle).collect();
+        Self { nodes, flat, corners, triangles, root }
     }
 }
 
@@ -68,8 +70,8 @@ fn sort_into_leaves(items: &mut [Item]) {
 
 /// World box of patch `p`, enlarged by an arbitrary little bit: the builder merges boxes whose union is smallest for
 /// both, and equal costs, as among a million identical triangles, would let it find only one pair a pass.
-fn box_of(p: usize, leaves: &[Leaf]) -> Aabb {
-    let (low, high) = bounds(leaves.iter().flat_map(Leaf::points));
+fn box_of(p: usize, patch: &[Corners]) -> Aabb {
+    let (low, high) = bounds(patch.iter().flatten().map(|&p| Vec3::from(p).as_dvec3()));
     // Farther out the builder's extents would overflow.
     let [low, high] = [low, high].map(|p| Vec3A::from(p.as_vec3()).clamp(Vec3A::splat(-1e37), Vec3A::splat(1e37)));
     let noise = (p as u32).wrapping_mul(0x9e37_79b9) as f32 / u32::MAX as f32;

@@ -2,7 +2,10 @@
 
 mod bvh;
 mod closest_point;
+mod flat;
+mod lanes;
 mod morton;
+mod nearest;
 mod node;
 mod search;
 

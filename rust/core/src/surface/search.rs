@@ -1,19 +1,20 @@
-//! The search for the triangle nearest to a query.
+//! The search for the triangles nearest to sixteen queries side by side.
 //!
-//! The eight triangles of a leaf are looked at in f32, and in f64 only those that the bound on its error lets be nearest.
+//! One descent in f32 for all of them collects the triangles that may be nearest to any; of these, f64 chooses. Each query
+//! has a bound of its own, so that none looks farther than it must; what they share is the way.
 
-use glam::Vec3;
 use pulp::{Simd, WithSimd};
 
 use super::SurfacePoint;
 use super::bvh::Bvh;
-use super::closest_point::closest_to_origin;
-use super::node::{LEAF, Leaf, mask};
+use super::lanes::{LANES, Lanes, Register};
+use super::nearest::Nearest;
+use super::node::{LEAF, WIDTH};
 
-/// Squared distances to boxes are f32; this much more than the best so far is still looked into.
-const BOX_SLACK: f64 = 1e-5;
+/// Candidates are looked at when there are so many, lest a million equal triangles fill the memory.
+const MANY: usize = 1024;
 
-/// Searches for consecutive queries that lie close together, each starting at the leaf where the last one ended.
+/// Searches for consecutive queries that lie close together, each packet starting at the leaf where the last one ended.
 ///
 /// Dispatched once for many queries, so that all below is compiled for the widest SIMD the machine has.
 pub(super) struct Batch<'a> {
@@ -26,112 +27,166 @@ impl WithSimd for Batch<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let mut stack = Vec::new();
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut search = Search { simd, bvh: self.bvh, stack: Vec::new(), candidates: Vec::new() };
         let mut start = 0;
-        for (&query, answer) in self.queries.iter().zip(self.answers) {
-            let nearest = nearest(self.bvh, query, start, &mut stack);
-            start = nearest.leaf;
-            *answer = nearest.surface_point();
+        for (queries, answers) in self.queries.chunks(LANES).zip(self.answers.chunks_mut(LANES)) {
+            let nearest = search.nearest(queries, start);
+            for (lane, answer) in answers.iter_mut().enumerate() {
+                *answer = nearest.surface_point(lane);
+            }
+            start = nearest.place(queries.len() - 1) / WIDTH as u32;
         }
     }
 }
 
-/// A triangle, its point nearest to the query, and how far that is.
+struct Search<'a, S> {
+    simd: S,
+    bvh: &'a Bvh,
+    stack: Vec<Visit>,
+    candidates: Vec<Candidate>,
+}
+
+/// A node or leaf to look into, and how far away it is at least, squared.
 #[derive(Clone, Copy)]
-struct Nearest {
-    squared: f64,
-    barycentric: [f64; 3],
-    triangle: u32,
-    leaf: u32,
+struct Visit {
+    at_least: Lanes,
+    child: u32,
 }
 
-impl Nearest {
+/// The place of a triangle that may be the nearest to some query, likewise.
+#[derive(Clone, Copy)]
+struct Candidate {
+    at_least: Lanes,
+    place: u32,
+}
+
+/// Up to [`LANES`] queries and what is known of them.
+struct Packet {
+    /// World coordinates by axis, NaN where there is no finite query.
+    queries: [Lanes; 3],
+    /// Squared distance beyond which nothing can be the nearest.
+    limit: Lanes,
+    /// The query whose distances decide which box is looked into first.
+    leader: usize,
+    nearest: Nearest,
+}
+
+impl Packet {
+    /// Lanes without a finite query ask for nothing.
     #[inline(always)]
-    fn surface_point(self) -> SurfacePoint {
-        SurfacePoint { triangle: self.triangle, barycentric: self.barycentric, distance: self.squared.sqrt() }
+    fn new(bvh: &Bvh, queries: &[[f32; 3]]) -> Self {
+        let (mut by_axis, mut limit) = ([Lanes([f32::NAN; LANES]); 3], Lanes([f32::NEG_INFINITY; LANES]));
+        for (lane, query) in queries.iter().enumerate() {
+            if query[0].is_finite() && query[1].is_finite() && query[2].is_finite() {
+                limit.0[lane] = f32::INFINITY;
+                for axis in 0..3 {
+                    by_axis[axis].0[lane] = query[axis];
+                }
+            }
+        }
+        Self { queries: by_axis, limit, leader: queries.len() / 2, nearest: Nearest::new(bvh) }
     }
 
-    /// Takes the triangles of `leaf`, the hierarchy's number `place`, into account, of equally near ones the lowest index.
+    /// The queries for which something at this squared distance may be the nearest, as bits.
     #[inline(always)]
-    fn visit(&mut self, leaf: &Leaf, place: u32, query: Vec3) {
-        let rough = leaf.rough_squared_distances(query);
-        let mut left = leaf.possible(&rough, self.squared.sqrt());
-        while left != 0 {
-            let mut lane = left.trailing_zeros() as usize;
-            for other in lanes(left) {
-                lane = if rough[other] < rough[lane] { other } else { lane };
-            }
-            let (barycentric, squared) = closest_to_origin(leaf.corners_from(query.as_dvec3(), lane));
-            let triangle = leaf.triangles[lane];
-            if squared < self.squared || (squared == self.squared && triangle < self.triangle) {
-                *self = Self { squared, barycentric, triangle, leaf: place };
-            }
-            left &= leaf.possible(&rough, self.squared.sqrt()) & !(1 << lane);
-        }
+    fn asking(&self, at_least: &Lanes) -> u32 {
+        at_least.at_most(&self.limit)
     }
+}
 
-    /// Boxes farther than this, squared, hold nothing as near.
+impl<S: Simd> Search<'_, S> {
+    /// `start` is a leaf that is likely near; it does not change the answer.
     #[inline(always)]
-    fn limit(&self) -> f32 {
-        (self.squared * (1.0 + BOX_SLACK)) as f32 + f32::MIN_POSITIVE
-    }
-}
-
-/// Descends into the nearest box first. `start` is a leaf that is likely near; it does not change the answer.
-#[inline(always)]
-fn nearest(bvh: &Bvh, query: [f32; 3], start: u32, stack: &mut Vec<(f32, u32)>) -> Nearest {
-    let first = bvh.leaves[start as usize].triangles[0];
-    let mut best = Nearest { squared: f64::INFINITY, barycentric: [1.0, 0.0, 0.0], triangle: first, leaf: start };
-    best.visit(&bvh.leaves[start as usize], start, query.into());
-    stack.clear();
-    stack.push((0.0, bvh.root));
-    while let Some((squared, child)) = stack.pop() {
-        if squared > best.limit() {
-            continue;
-        }
-        if child & LEAF != 0 {
-            if child != LEAF | start {
-                let leaf = child & !LEAF;
-                best.visit(&bvh.leaves[leaf as usize], leaf, query.into());
+    fn nearest(&mut self, queries: &[[f32; 3]], start: u32) -> Nearest {
+        let mut packet = Packet::new(self.bvh, queries);
+        self.visit_leaf(start, &mut packet);
+        self.stack.push(Visit { at_least: Lanes::ZERO, child: self.bvh.root });
+        while let Some(Visit { at_least, child }) = self.stack.pop() {
+            if packet.asking(&at_least) == 0 {
+                continue;
             }
-            continue;
+            if child & LEAF == 0 {
+                self.open_node(child, &packet);
+            } else if child != LEAF | start {
+                self.visit_leaf(child & !LEAF, &mut packet);
+            }
         }
-        let node = &bvh.nodes[child as usize];
-        let squared = node.squared_distances(query);
-        let limit = best.limit();
-        let bottom = stack.len();
-        for lane in lanes(node.used & mask(squared.map(|s| s <= limit))) {
-            insert_descending(stack, bottom, (squared[lane], node.children[lane]));
+        self.choose(&mut packet);
+        packet.nearest
+    }
+
+    /// Puts the children that may hold a nearest triangle on the stack, the nearest last.
+    #[inline(always)]
+    fn open_node(&mut self, node: u32, packet: &Packet) {
+        let node = &self.bvh.nodes[node as usize];
+        let local = node.local(self.simd, &packet.queries);
+        let bottom = self.stack.len();
+        for child in 0..node.count {
+            let at_least = node.squared_distances(self.simd, child, &local);
+            if packet.asking(&at_least) != 0 {
+                let visit = Visit { at_least, child: node.children[child] };
+                insert_descending(&mut self.stack, bottom, visit, packet.leader);
+            }
         }
     }
-    best
+
+    /// Lowers the limits to what the triangles of `leaf` allow, and collects those within them.
+    #[inline(always)]
+    fn visit_leaf(&mut self, leaf: u32, packet: &mut Packet) {
+        let simd = self.simd;
+        let first = leaf as usize * WIDTH;
+        let triangles = &self.bvh.flat[first..self.bvh.flat.len().min(first + WIDTH)];
+        let mut at_least = [Lanes::ZERO; WIDTH];
+        for (triangle, at_least) in triangles.iter().zip(&mut at_least) {
+            for k in 0..Register::<S>::COUNT {
+                let [x, y, z] = &packet.queries;
+                let query = [Register::load(simd, x, k), Register::load(simd, y, k), Register::load(simd, z, k)];
+                let (low, high) = triangle.squared_distance_bounds(simd, query);
+                low.store(at_least, k);
+                high.min(Register::load(simd, &packet.limit, k)).store(&mut packet.limit, k);
+            }
+        }
+        for (at_least, place) in at_least[..triangles.len()].iter().zip(first as u32..) {
+            if packet.asking(at_least) != 0 {
+                self.candidates.push(Candidate { at_least: *at_least, place });
+            }
+        }
+        if self.candidates.len() >= MANY {
+            self.choose(packet);
+        }
+    }
+
+    /// Takes the candidates into account, each for the queries that still ask for it.
+    #[inline(always)]
+    fn choose(&mut self, packet: &mut Packet) {
+        let mut queries = [[0.0; LANES]; 3];
+        for (wide, lanes) in queries.iter_mut().zip(&packet.queries) {
+            wide.iter_mut().zip(lanes.0).for_each(|(wide, x)| *wide = x.into());
+        }
+        for candidate in self.candidates.drain(..) {
+            let asking = candidate.at_least.at_most(&packet.limit);
+            packet.nearest.consider(self.bvh, candidate.place, &queries, asking);
+        }
+    }
 }
 
-/// The lanes that are set, in order.
+/// Inserts into `stack[bottom..]`, whose last is the nearest to query `leader`.
 #[inline(always)]
-fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = mask.trailing_zeros() as usize;
-        mask &= mask.wrapping_sub(1);
-        (lane < u32::BITS as usize).then_some(lane)
-    })
-}
-
-/// Inserts into `stack[bottom..]`, whose last is the nearest.
-#[inline(always)]
-fn insert_descending(stack: &mut Vec<(f32, u32)>, bottom: usize, entry: (f32, u32)) {
-    stack.push(entry);
+fn insert_descending(stack: &mut Vec<Visit>, bottom: usize, visit: Visit, leader: usize) {
+    stack.push(visit);
     let mut place = stack.len() - 1;
-    while place > bottom && stack[place - 1].0 < entry.0 {
+    while place > bottom && stack[place - 1].at_least.0[leader] < visit.at_least.0[leader] {
         stack[place] = stack[place - 1];
         place -= 1;
     }
-    stack[place] = entry;
+    stack[place] = visit;
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     #[test]
@@ -141,10 +196,12 @@ mod tests {
         let triangles: Vec<u32> = (0..2000).collect();
         let bvh = Bvh::new(&triangles, |t| [point(t), point(t) + 0.1 * point(t + 7), point(t) + 0.2 * point(t + 9)]);
         let queries: Vec<_> = (0..500).map(|i| (1.5 * point(31 * i)).to_array()).collect();
-        let mut answers = [vec![SurfacePoint::default(); 500], vec![SurfacePoint::default(); 500]];
-        let [widest, scalar] = &mut answers;
-        pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries, answers: widest });
-        Batch { bvh: &bvh, queries: &queries, answers: scalar }.with_simd(pulp::Scalar::new());
-        assert_eq!(answers[0], answers[1]);
+        for count in [500, 1, 15, 17] {
+            let mut answers = [vec![SurfacePoint::default(); count], vec![SurfacePoint::default(); count]];
+            let [widest, scalar] = &mut answers;
+            pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries[..count], answers: widest });
+            Batch { bvh: &bvh, queries: &queries[..count], answers: scalar }.with_simd(pulp::Scalar::new());
+            assert_eq!(answers[0], answers[1]);
+        }
     }
 }
