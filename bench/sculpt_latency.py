@@ -28,7 +28,7 @@ Milliseconds, median (worst) of {strokes} strokes. {machine}
 | noticed | Blender | its loop wakes up, ends the brush with its undo step, and hands on our timer's event |
 | look | ours | which vertices have moved |
 | solve | ours | the pose's matrices, the weights, and all else of the session |
-| write | ours | the weights; mostly Blender giving the mesh weights of its own, one allocation a vertex |
+| write | ours | the weights; the mesh got an array of its own for them while the brush was held still |
 | put back | ours | the positions at rest |
 | ours | ours | the last four: the whole of `SculptSession.stroke` |
 | evaluate | Blender | the Armature modifier, and Sculpt mode's search tree and deformation matrices |

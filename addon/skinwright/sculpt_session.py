@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from . import csr, native
 from .desparsify import DesparsifyParams, desparsify
 from .reporting import SculptReport
-from .scene import armature, corrective, mesh, poses, rest_shape, sculpting, vertex_groups
+from .scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups
 from .scene.error import SceneError
 
 # Every keyframe costs a pass over the mesh when a session begins.
@@ -104,6 +104,10 @@ class SculptSession:
         if kappa != self.options.kappa:
             self._solver.set_options(kappa, self.options.passes)
             self.options = replace(self.options, kappa=kappa)
+
+    def expect_stroke(self) -> None:
+        """Have what a stroke's write begins with done before it ends: Blender gives the mesh weights of its own."""
+        deform_array.unshare(self._found().data)
 
     def stroke(self) -> Outcome | None:
         """Turn what a brush has moved since the last time into weights; None if nothing has moved.

@@ -16,6 +16,9 @@ class Session:
     def assert_state(self):
         self.asked.append("state")
 
+    def expect_stroke(self):
+        self.asked.append("expect")
+
     def set_strength(self, kappa):
         self.asked.append(kappa)
 
@@ -56,6 +59,15 @@ def test_a_brush_that_was_down_is_looked_at_before_blender_has_counted_it(watch,
     assert watch.look(0.2) == "outcome"
     assert watch.look(0.2) is None
     assert session.asked == [0.2, "stroke"]
+
+
+def test_only_a_brush_that_rests_leaves_time_for_more(watch, changes, session):
+    for _ in range(3):
+        changes.version += 1
+        watch.expect_stroke()
+    assert session.asked == []
+    watch.expect_stroke()
+    assert session.asked == ["expect"]
 
 
 def test_after_an_undo_of_blenders_the_session_comes_first(watch, changes, session):

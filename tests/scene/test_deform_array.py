@@ -77,6 +77,25 @@ def test_writing_does_not_reach_a_copy_that_shares_the_weights(deform_array, mes
     assert by_api(copy) == before
 
 
+def test_unsharing_gives_an_array_of_its_own_and_tells_nobody(deform_array, mesh):
+    import bpy
+
+    def address(mesh):
+        return deform_array.find_deform_layer(mesh.as_pointer(), deform_array.find_layout())
+
+    before, updates = by_api(mesh), []
+    copy = mesh.copy()
+    bpy.context.collection.objects.link(bpy.data.objects["Object"])
+    bpy.context.view_layer.update()
+    assert address(mesh) == address(copy)
+    bpy.app.handlers.depsgraph_update_post.append(lambda *_: updates.append("update"))
+    deform_array.unshare(mesh)
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.pop()
+    assert address(mesh) != address(copy)
+    assert by_api(mesh) == before == by_api(copy) and not updates
+
+
 def test_a_mesh_struct_that_does_not_fit_is_refused(deform_array, mesh, monkeypatch):
     true = deform_array.find_layout()
     wrong = replace(true, mesh_n_vertices=true.mesh_n_vertices + 4)

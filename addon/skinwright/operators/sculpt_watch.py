@@ -12,9 +12,16 @@ class StrokeWatch:
         self._session = session
         self._seen: int | None = changes.version
         self._undone = changes.undone
+        self._expected: int | None = None
 
     def expect_stroke(self) -> None:
-        """A brush is down or may come down: what it does is in the mesh before Blender evaluates and counts it."""
+        """A brush is down or may come down: what it does is in the mesh before Blender evaluates and counts it.
+
+        A brush that rests leaves time for what the stroke would else wait for; one that moves is not slowed down.
+        """
+        if self._expected == changes.version:
+            self._session.expect_stroke()
+        self._expected = changes.version
         self._seen = None
 
     def look(self, kappa: float) -> Outcome | None:

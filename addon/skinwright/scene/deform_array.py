@@ -68,7 +68,7 @@ def open_array(mesh: bpy.types.Mesh, indices: np.ndarray) -> DeformArray | None:
     layout = find_layout()
     if layout is None or not mesh.vertices:
         return None
-    len(mesh.vertices[0].groups)  # un-shares the array
+    unshare(mesh)
     start = mesh.as_pointer()
     if ctypes.c_int32.from_address(start + layout.mesh_n_vertices).value != len(mesh.vertices):
         return None
@@ -76,6 +76,12 @@ def open_array(mesh: bpy.types.Mesh, indices: np.ndarray) -> DeformArray | None:
     # A mesh without the layer has no weights at all, which the check confirms.
     vertices = as_array(address, len(mesh.vertices), VERTEX) if address else np.zeros(len(mesh.vertices), VERTEX)
     return gather(vertices[indices]) if agrees_with_api(vertices, mesh) else None
+
+
+def unshare(mesh: bpy.types.Mesh) -> None:
+    """Make Blender give the mesh an array of its own, and tell nobody: no weight changes. One allocation a vertex."""
+    if mesh.vertices:
+        len(mesh.vertices[0].groups)  # it might be written to
 
 
 def agrees_with_api(vertices: np.ndarray, mesh: bpy.types.Mesh) -> bool:
