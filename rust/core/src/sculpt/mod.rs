@@ -6,6 +6,7 @@
 //! As sum w = 1, the first term is w'Hw with H = sum_p alpha_p E_p'E_p, E_p = [d_jp - t_p]. Lengths are divided by the
 //! diagonal of the rest mesh, so that k = kappa has no unit. At rest all d_j agree: the rest shape always holds.
 
+mod checks;
 mod range_of_motion;
 mod residual;
 mod rest_shape;
@@ -20,6 +21,8 @@ pub use residual::Residuals;
 pub use rest_shape::RestShape;
 pub use simplex_qp::SimplexQp;
 pub use stroke::Stroke;
+
+use checks::{check_character, check_length, check_options};
 
 use crate::error::{Error, Result};
 use crate::skinning;
@@ -83,7 +86,7 @@ impl SculptSolver {
     /// [`Error::LengthMismatch`], [`Error::PositionNotFinite`], [`Error::WeightNegative`], [`Error::InvalidWeights`] for a
     /// vertex with more members than [`MAX_MEMBERS`], [`Error::InvalidParameter`].
     pub fn new(rest_positions: &[[f32; 3]], weights: Weights, locked: &[bool], options: Options) -> Result<Self> {
-        check(rest_positions, &weights, locked, options)?;
+        check_character(rest_positions, &weights, locked, options)?;
         let rest: Vec<DVec3> = rest_positions.iter().map(|&p| Vec3::from(p).as_dvec3()).collect();
         let low = rest.iter().fold(DVec3::INFINITY, |low, &p| low.min(p));
         let high = rest.iter().fold(DVec3::NEG_INFINITY, |high, &p| high.max(p));
@@ -238,44 +241,4 @@ impl SculptSolver {
             None => Ok(()),
         }
     }
-}
-
-fn check(rest_positions: &[[f32; 3]], weights: &Weights, locked: &[bool], options: Options) -> Result<()> {
-    check_options(options)?;
-    check_length("rest_positions", rest_positions.len(), weights.vertex_count())?;
-    if !locked.is_empty() {
-        check_length("locked", locked.len(), weights.n_bones() as usize)?;
-    }
-    if let Some(vertex) = rest_positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
-        return Err(Error::PositionNotFinite { what: "rest", vertex });
-    }
-    for i in 0..weights.vertex_count() {
-        let (bones, values) = weights.row(i);
-        if bones.len() > MAX_MEMBERS {
-            let reason = format!(
-                "vertex {i} has {} influences, sculpting takes at most {MAX_MEMBERS}: desparsify first",
-                bones.len()
-            );
-            return Err(Error::InvalidWeights { reason });
-        }
-        if let Some(at) = values.iter().position(|&x| x < 0.0) {
-            return Err(Error::WeightNegative { vertex: i, bone: bones[at] });
-        }
-    }
-    Ok(())
-}
-
-fn check_options(options: Options) -> Result<()> {
-    let invalid = |name, value, must| Err(Error::InvalidParameter { name, value, must });
-    if !(options.kappa > 0.0 && options.kappa.is_finite()) {
-        return invalid("kappa", options.kappa, "it must be more than 0, for instance 0.01");
-    }
-    if options.passes == 0 {
-        return invalid("passes", 0.0, "at least one pass is needed");
-    }
-    Ok(())
-}
-
-fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
-    if found == expected { Ok(()) } else { Err(Error::LengthMismatch { what, found, expected }) }
 }

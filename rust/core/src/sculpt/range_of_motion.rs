@@ -2,7 +2,8 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::{SculptSolver, check_length};
+use super::SculptSolver;
+use super::checks::check_length;
 use crate::error::{Error, Result};
 
 /// Turns of a joint that a character takes sooner or later, in degrees.

@@ -3,8 +3,9 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::checks::check_length;
 use super::residual::{reachability, residual};
-use super::{SculptSolver, Target, check_length};
+use super::{SculptSolver, Target};
 use crate::error::{Error, Result};
 
 /// What a stroke did.

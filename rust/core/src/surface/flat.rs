@@ -15,11 +15,12 @@ const SHARE_OF_EDGE: f64 = 8e-6;
 /// Each test is stable then, whatever the shape: the distance to an edge is one along and one across its direction, without
 /// a division, and the angle at the apex, where the inside is decided by both sloping edges, is at least 60 degrees.
 ///
-/// The bound: let u = 2^-24, d the distance and L the longest edge. The query relative to the origin, at most d + L long, is
-/// off by u of that, and by six u in the frame (rounded axes, three products, two sums); directions and lengths of the
-/// edges add two, the products along an edge three, the difference to the edge's end one. So no edge is off by more than
-/// 12 u (d + L), and a query on the wrong side of a test is near that edge by as much again, twice where two tests meet: in
-/// all e = 36 u (d + L). Then the square is off by 2 d e + e^2 < 6.5e-6 d^2 + 2.2e-6 L^2, a third of what is allowed.
+/// The bound, with u = 2^-24, d the distance, L the longest edge, and R = d + L, which the query is from the origin at most: a
+/// coordinate in the frame is off by 6 u R (a difference, rounded axes, three products, two sums); how far along an edge and
+/// how far across it by 15 u R and 13 u R (rounded direction and end, two products, a sum, a difference); the distance to
+/// the edge by 20 u R. What the tests take for inside is outside by 26 u R at most, twice a test's error where two
+/// sides meet at 60 degrees; what they take for outside is within 13 u R of a side. In all the distance is off by e < 36 u R
+/// and its square by 2 d e + e^2 < 6.5e-6 d^2 + 2.2e-6 L^2, a third of what is allowed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FlatTriangle {
     /// The longest edge's start in world space.
