@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python check bench sculpt-eval extension clean
+.PHONY: help demo test test-rust test-python fuzz check bench sculpt-eval extension clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -40,7 +40,7 @@ BPY_.venv-5.2 := $(BPY_5.2)
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name '*.toml' -o -name '*.pyi')
 IN_TIME := timeout --kill-after=10
-PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest
+PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest --hypothesis-seed=1
 
 help:
 	@sed -n 's/^## //p' Makefile
@@ -53,6 +53,8 @@ demo: .venv/native.stamp $(BODY)
 ## make test       the whole suite: Rust, then Python inside every Blender that this machine can have
 test: test-rust test-python
 
+# A suite that must pass asks the same every time; `make fuzz` asks something new.
+test-rust: export PROPTEST_RNG_SEED := 1
 test-rust: cargo
 	cargo test --quiet
 
@@ -60,6 +62,10 @@ test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
 	mkdir -p out && cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
 		--allowlist ../rust/native/stubtest_allowlist.txt
 	$(foreach venv,$(OTHER_VENVS),$(call PYTEST,$(venv)) &&) $(call PYTEST,.venv)
+
+## make fuzz       the property tests of the Rust library with fresh random numbers, 20 times as many
+fuzz: cargo
+	PROPTEST_CASES=5000 cargo test --quiet --test '*'
 
 ## make check      the whole gate: formatting, lints, types, tests
 check: .venv/tests.stamp cargo

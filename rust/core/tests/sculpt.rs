@@ -225,20 +225,31 @@ impl Character {
     }
 }
 
-/// Sum over poses of the squared distance to the targets.
-fn energies(character: &Character, weights: &Weights, targets: &[(usize, Vec<[f32; 3]>)]) -> Vec<f64> {
-    let mut sum = vec![0.0; character.rest.len()];
-    for (pose, targets) in targets {
-        for ((e, p), &t) in sum.iter_mut().zip(character.posed(weights, *pose)).zip(targets) {
-            *e += p.distance_squared(Vec3::from(t).as_dvec3());
-        }
+/// Where vertex `i` lies in a pose, in f64, and how far that can be off because its weights are stored in f32.
+fn blended(character: &Character, weights: &Weights, pose: usize, i: usize) -> (DVec3, f64) {
+    let (bones, values) = weights.row(i);
+    let rest = Vec3::from(character.rest[i]).as_dvec3();
+    let moved = bones.iter().map(|&b| character.poses[pose][b as usize].transform_point3(rest));
+    let members: Vec<(DVec3, f64)> = moved.zip(values.iter().map(|&w| f64::from(w))).collect();
+    let total: f64 = members.iter().map(|m| m.1).sum();
+    let position = members.iter().map(|&(p, w)| p * w).sum::<DVec3>() / total;
+    // No weight is off by more than half the last bit of 1, 2^-25; doubled for the division by the total.
+    let rounding = members.iter().map(|m| m.0.distance(position)).sum::<f64>() * f64::from(f32::EPSILON) / 2.0;
+    (position, rounding)
+}
+
+/// Distance of vertex `i` to its targets in all poses together (the root of the sum of squares), and its rounding.
+fn distance(character: &Character, weights: &Weights, sculpted: &[Vec<[f32; 3]>], i: usize) -> (f64, f64) {
+    let (mut squared, mut roundings) = (0.0, 0.0);
+    for (pose, targets) in sculpted.iter().enumerate() {
+        let (position, rounding) = blended(character, weights, pose, i);
+        squared += position.distance_squared(Vec3::from(targets[i]).as_dvec3());
+        roundings += rounding;
     }
-    sum
+    (squared.sqrt(), roundings)
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
     #[test]
     fn strokes_keep_weights_valid_and_take_no_vertex_farther_from_its_targets(
         seed in any::<u64>(), members in 1usize..=6, size in 0.001f64..1.0, lock in prop::option::of(0usize..6)
@@ -251,12 +262,14 @@ proptest! {
         let mut sculpted = Vec::new();
         for pose in 0..3 {
             let number = solver.add_pose(character.poses[pose].clone(), 1.0).unwrap();
-            sculpted.push((pose, character.targets(&mut random, pose, size)));
-            let before = energies(&character, &solver.weights(), &sculpted);
-            let stroke = solver.stroke(number, &character.all(), &sculpted[pose].1).unwrap();
+            sculpted.push(character.targets(&mut random, pose, size));
+            let old = solver.weights();
+            let stroke = solver.stroke(number, &character.all(), &sculpted[pose]).unwrap();
             let weights = solver.weights();
-            for (after, before) in energies(&character, &weights, &sculpted).into_iter().zip(before) {
-                prop_assert!(after <= before * (1.0 + 1e-6) + 1e-10, "{} > {}", after, before);
+            for i in 0..character.rest.len() {
+                let (before, _) = distance(&character, &old, &sculpted, i);
+                let (after, rounding) = distance(&character, &weights, &sculpted, i);
+                prop_assert!(after <= before + rounding, "vertex {}: {} > {} + {}", i, after, before, rounding);
             }
             prop_assert!(stroke.reachability <= 1.0);
             prop_assert_eq!(weights.bones(), character.weights.bones());
@@ -505,8 +518,6 @@ fn the_rest_shape_follows_where_weights_cannot() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
-
     #[test]
     fn more_rounds_of_the_rest_shape_never_do_worse(seed in any::<u64>(), stiffness in 0.01f64..1.0) {
         let character = Character::random(seed, 20, 4, 1.0, vec![]);
