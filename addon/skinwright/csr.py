@@ -54,7 +54,9 @@ def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
     """The same, with the kept columns numbered anew."""
     if columns.all():
         return rows
-    kept = keep_columns(rows, columns)
+    # Often the dropped columns hold nothing.
+    used = np.bincount(rows.bones, minlength=len(columns)) > 0
+    kept = rows if columns[used].all() else keep_columns(rows, columns)
     return kept._replace(bones=(np.cumsum(columns) - 1).astype(np.uint32)[kept.bones])
 
 
@@ -80,6 +82,8 @@ def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
 
 def take_rows(rows: Rows, indices: NDArray[np.integer]) -> Rows:
     """The rows of these indices, in their order."""
+    if np.array_equal(indices, np.arange(len(rows.indptr) - 1)):
+        return rows
     counts = np.diff(rows.indptr)[indices].astype(np.int64)
     indptr = np.concatenate([[0], np.cumsum(counts)])
     entries = np.arange(indptr[-1]) + np.repeat(rows.indptr[indices] - indptr[:-1], counts)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -197,9 +198,10 @@ def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator
     # NumPy sorts 16 bits by digits, six times as fast.
     small = group.astype(np.uint16) if group.max(initial=0) < 1 << 16 else group
     order = np.argsort(small, kind="stable")
-    for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        if members.size:
-            yield int(group[members[0]]), vertex[members].tolist()
+    ordered, vertices = small[order], vertex[order]
+    for start, end in pairwise([0, *(np.flatnonzero(np.diff(ordered)) + 1).tolist(), len(ordered)]):
+        if start < end:
+            yield int(ordered[start]), vertices[start:end].tolist()
 
 
 def _keys(row: NDArray[np.int64], group: NDArray[np.int64]) -> NDArray[np.int64]:

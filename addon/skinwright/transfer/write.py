@@ -36,7 +36,8 @@ def write(body: Body, garment: Garment, result: Result, params: TransferParams) 
 
 def _needed_columns(result: Result, rows: Rows, present: set[str]) -> tuple[list[str], Rows]:
     """Without the groups that would be created to stay empty."""
-    needed = np.isin(np.arange(len(result.names)), rows.bones) | np.array([n in present for n in result.names], bool)
+    used = np.bincount(rows.bones, minlength=len(result.names)) > 0
+    needed = used | np.array([name in present for name in result.names], bool)
     return [name for name, kept in zip(result.names, needed, strict=True) if kept], csr.take_columns(rows, needed)
 
 

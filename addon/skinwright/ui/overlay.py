@@ -52,7 +52,7 @@ def _batch(picture: Picture, opacity: float) -> gpu.types.GPUBatch:
     global _kept
     if _kept is None or _kept[0] is not picture or _kept[1] != opacity:
         # A little of the light that Solid shading has, or the shape could not be seen.
-        shade = 0.72 + 0.28 * np.clip(picture.normals @ LIGHT, -1, 1)
+        shade = 0.72 + 0.28 * np.clip((picture.normals * LIGHT).sum(axis=1), -1, 1)
         rgba = np.empty((len(picture.values), 4), np.float32)
         rgba[:, :3], rgba[:, 3] = colours.of_values(picture.kind, picture.values) * shade[:, None], opacity
         content = {"pos": picture.positions, "color": rgba}
