@@ -43,7 +43,12 @@ class MaskPainting:
         self._runner: jobs.Runner | None = None
         self._asked: tuple = ()
         self._since = 0.0
-        self._version, self._undone = -1, changes.undone
+        self._undone = changes.undone
+        self.expect_stroke()
+
+    def expect_stroke(self) -> None:
+        """A brush is down or may come down: the mask is to be read before Blender evaluates and counts the change."""
+        self._version = -1
 
     def tick(self, params: TransferParams, live: bool) -> bool:
         """Start, take in, or leave alone the solve; gives whether weights were written."""

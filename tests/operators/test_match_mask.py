@@ -182,6 +182,16 @@ class TestPainting:
         transfer(bpy.context, bpy.context.scene.skinwright.transfer.source, [coat], params())
         assert builders.weights(coat) == followed
 
+    def test_an_expected_stroke_is_seen_before_blender_counts_it(self, coat, painting):
+        self.settle(painting)
+        first = builders.weights(coat)
+        coat.vertex_groups["Match Mask"].add(list(range(9)), 0.0, "REPLACE")
+        assert not painting.tick(params(), True)
+        painting.expect_stroke()
+        assert painting.tick(params(), True)
+        assert builders.weights(coat) != first
+        painting.cancel(bpy.context)
+
     def test_finish_restores_mode_group_and_overlay(self, coat, painting):
         painting.finish(bpy.context)
         assert coat.mode == "OBJECT"

@@ -11,11 +11,9 @@ from ..transfer.params import TransferParams
 from . import held_input, timers
 from .preview_match import refusal, target
 
-TICK_SECONDS = 0.02
-
 
 class SKINWRIGHT_OT_paint_match_mask(Operator):
-    """Runs beside the brushes. It sees no release of the mouse, so it looks on a timer whether a stroke has ended."""
+    """Runs beside the brushes. It sees no release of the mouse, so a timer looks whether a stroke has ended."""
 
     bl_idname = "skinwright.paint_match_mask"
     bl_label = "Paint Match Mask"
@@ -45,7 +43,7 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
         match_session.current = painting.session
         # Else undoing the first stroke would also undo that painting has begun.
         bpy.ops.ed.undo_push(message=self.bl_label)
-        self._timer = timers.start(context, TICK_SECONDS)
+        self._timer = timers.start(context, timers.BRUSH_SECONDS)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set("Paint the match mask   Enter: keep   Esc: weights as they were")
         return {"RUNNING_MODAL"}
@@ -60,7 +58,10 @@ class SKINWRIGHT_OT_paint_match_mask(Operator):
             return self._end(context, keep=False)
         if pressed in ("RET", "NUMPAD_ENTER") or cls.asked_to_end == "KEEP":
             return self._end(context, keep=True)
-        if event.type == "TIMER" and not held_input.by_another(context, cls):
+        held = held_input.by_another(context, cls)
+        if held or event.value == "PRESS":
+            self._painting.expect_stroke()
+        elif event.type == "TIMER":
             self._tick(context)
         return {"PASS_THROUGH"}
 

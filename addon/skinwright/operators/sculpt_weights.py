@@ -14,11 +14,6 @@ from ..sculpt_session import SculptSession
 from . import held_input, sculpt_begin, sculpt_keys, sculpt_undo, timers
 from .sculpt_watch import StrokeWatch
 
-# As long as Blender's main loop sleeps when nothing happens. With a timer that is no slower, whatever wakes the loop
-# finds the timer due as well: its event follows the release in one queue, and weights are written before Blender
-# evaluates and draws. A timer of 20 ms came after the drawing in 13 strokes of 22, and so long the view showed what
-# the brush had made of the shape at rest.
-TICK_SECONDS = 0.005
 # While posing between strokes, Object and Pose mode belong to the session too.
 MODES = {"SCULPT", "OBJECT", "POSE"}
 
@@ -53,7 +48,7 @@ class SKINWRIGHT_OT_sculpt_weights(Operator):
         sculpt_keys.forget()
         self._watch = StrokeWatch(self._session)
         self._steps_to_undo, self._left = False, False
-        self._timer = timers.start(context, TICK_SECONDS)
+        self._timer = timers.start(context, timers.BRUSH_SECONDS)
         context.window_manager.modal_handler_add(self)
         _show(context, "sculpt, and the weights follow")
         return {"RUNNING_MODAL"}
