@@ -6,7 +6,7 @@ mod common;
 
 use common::{Fixture, body, tube};
 use divan::Bencher;
-use skinwright_core::adjacency::{Islands, clean_triangles};
+use skinwright_core::adjacency::Topology;
 use skinwright_core::laplacian::Laplacian;
 use skinwright_core::transfer::system::{assemble, independent_blocks, number_unknowns};
 use skinwright_core::transfer::{Inpainting, Settings, Source};
@@ -38,20 +38,14 @@ fn source() -> Source {
 fn laplacian(bencher: Bencher) {
     let garment = garment();
     let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
-    bencher.bench_local(|| {
-        let (clean, around) = clean_triangles(&garment.triangles, garment.positions.len());
-        let islands = Islands::new(&clean, garment.positions.len());
-        Laplacian::new(&mesh, &clean, &around, &islands)
-    });
+    bencher.bench_local(|| Laplacian::new(&mesh, &Topology::new(&garment.triangles, garment.positions.len())));
 }
 
 #[divan::bench]
 fn blocks_and_assembly(bencher: Bencher) {
     let garment = garment();
     let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
-    let (clean, around) = clean_triangles(&garment.triangles, garment.positions.len());
-    let islands = Islands::new(&clean, garment.positions.len());
-    let laplacian = Laplacian::new(&mesh, &clean, &around, &islands);
+    let laplacian = Laplacian::new(&mesh, &Topology::new(&garment.triangles, garment.positions.len()));
     let progress = Progress::default();
     let prepared = Inpainting::new(source(), garment.positions.clone(), garment.triangles.clone(), &progress).unwrap();
     let matched = prepared.matched(None, &Settings::default()).unwrap();

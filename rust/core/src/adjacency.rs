@@ -46,25 +46,41 @@ impl VertexTriangles {
     }
 }
 
-/// Drops triangles that name a vertex twice, and every repetition of the same three vertices (whatever the winding).
-/// Both would put NaN or a doubled stiffness into the Laplacian. Returns the triangles that stay, in order, and who
-/// touches them.
-pub fn clean_triangles(triangles: &[[u32; 3]], vertex_count: usize) -> (Cow<'_, [[u32; 3]]>, VertexTriangles) {
-    let repeats_a_vertex = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-    let mut clean = Cow::Borrowed(triangles);
-    if triangles.par_iter().any(repeats_a_vertex) {
-        clean = Cow::Owned(triangles.iter().filter(|t| !repeats_a_vertex(t)).copied().collect());
+/// Clean triangles and who touches whom through them.
+#[derive(Debug)]
+pub struct Topology<'a> {
+    /// None names a vertex twice, and no two have the same three vertices; in order.
+    pub triangles: Cow<'a, [[u32; 3]]>,
+    /// The triangles around each vertex.
+    pub around: VertexTriangles,
+    /// What hangs together.
+    pub islands: Islands,
+}
+
+impl<'a> Topology<'a> {
+    /// Drops triangles that name a vertex twice, and every repetition of the same three vertices (whatever the winding).
+    /// Both would put NaN or a doubled stiffness into the Laplacian.
+    pub fn new(triangles: &'a [[u32; 3]], vertex_count: usize) -> Self {
+        let repeats_a_vertex = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+        let mut triangles = Cow::Borrowed(triangles);
+        if triangles.par_iter().any(repeats_a_vertex) {
+            triangles = triangles.iter().filter(|t| !repeats_a_vertex(t)).copied().collect();
+        }
+        let find_duplicates = || {
+            let around = VertexTriangles::new(&triangles, vertex_count);
+            (duplicated_triangles(&triangles, &around, vertex_count), around)
+        };
+        // Duplicates connect nothing that is not connected without them.
+        let ((duplicates, mut around), islands) =
+            rayon::join(find_duplicates, || Islands::new(&triangles, vertex_count));
+        if !duplicates.is_empty() {
+            let mut dropped = duplicates.iter().peekable();
+            let keep = |&(t, _): &(usize, &[u32; 3])| dropped.next_if(|&&d| d as usize == t).is_none();
+            triangles = triangles.iter().enumerate().filter(keep).map(|(_, &corners)| corners).collect();
+            around = VertexTriangles::new(&triangles, vertex_count);
+        }
+        Self { triangles, around, islands }
     }
-    let around = VertexTriangles::new(&clean, vertex_count);
-    let duplicates = duplicated_triangles(&clean, &around, vertex_count);
-    if duplicates.is_empty() {
-        return (clean, around);
-    }
-    let mut dropped = duplicates.iter().peekable();
-    let keep = |&(t, _): &(usize, &[u32; 3])| dropped.next_if(|&&d| d as usize == t).is_none();
-    let clean: Vec<_> = clean.iter().enumerate().filter(keep).map(|(_, &corners)| corners).collect();
-    let around = VertexTriangles::new(&clean, vertex_count);
-    (Cow::Owned(clean), around)
 }
 
 /// Every triangle whose vertex set an earlier triangle has already, ascending. Equal sets meet at their smallest vertex.

@@ -5,24 +5,21 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::adjacency::{Islands, VertexTriangles};
+use crate::adjacency::{Islands, Topology, VertexTriangles};
 use crate::mesh::TriMesh;
 
 /// Slack that mollification leaves in every triangle inequality, as a share of the island's mean edge.
 const MOLLIFICATION: f64 = 1e-5;
 
-/// Vertices a worker takes at a time.
-const CHUNK: usize = 4096;
+/// Vertices or triangles a worker takes at a time.
+const RUN: usize = 4096;
 
 /// Stiffness S = -L (half cotangents, rows sum to zero, positive semi-definite) and lumped mixed Voronoi areas M
 /// (Meyer et al. 2003). S is kept by row: `S_ij = -cotangent`, `S_ii = sum of the row's cotangents`.
 #[derive(Debug)]
 pub struct Laplacian {
-    starts: Vec<u32>,
-    neighbours: Vec<u32>,
-    cotangents: Vec<f64>,
-    diagonal: Vec<f64>,
-    mass: Vec<f64>,
+    /// Where the workers have left them: to put the rows into arrays of the whole mesh took a third of the time.
+    runs: Vec<Rows>,
 }
 
 /// What one triangle gives: half cotangent opposite to, and Voronoi area at, each corner.
@@ -33,48 +30,25 @@ struct Corners {
 }
 
 impl Laplacian {
-    /// Assembles S and M over clean `triangles` (no repeated vertex, no duplicates) of `mesh`.
+    /// Assembles S and M over the clean triangles of `mesh`.
     ///
     /// A triangle whose inequality holds with less than 1e-5 of its island's mean edge gets its three edge lengths
     /// increased until it does (intrinsic mollification, Sharp & Crane 2020, section 4.5, but per triangle, so that
     /// good triangles keep their cotangents to the bit). No value is ever NaN or infinite, and every mass is positive.
-    pub fn new(mesh: &TriMesh<'_>, triangles: &[[u32; 3]], around: &VertexTriangles, islands: &Islands) -> Self {
+    pub fn new(mesh: &TriMesh<'_>, Topology { triangles, around, islands }: &Topology<'_>) -> Self {
         let slack = island_slack(mesh, triangles, islands);
         let corners: Vec<Corners> = triangles
             .par_iter()
             .map(|t| Corners::new(t.map(|i| mesh.position(i)), slack[islands.of_vertex()[t[0] as usize] as usize]))
             .collect();
         let count = mesh.vertex_count();
-        let run = |k: usize| k * CHUNK..((k + 1) * CHUNK).min(count);
-        let rows = |k| Rows::new(run(k), triangles, around, &corners);
-        Self::concatenate((0..count.div_ceil(CHUNK)).into_par_iter().map(rows).collect(), count)
-    }
-
-    fn concatenate(parts: Vec<Rows>, vertex_count: usize) -> Self {
-        let nnz = parts.iter().map(|part| part.neighbours.len()).sum();
-        let mut out = Self {
-            starts: Vec::with_capacity(vertex_count + 1),
-            neighbours: Vec::with_capacity(nnz),
-            cotangents: Vec::with_capacity(nnz),
-            diagonal: Vec::with_capacity(vertex_count),
-            mass: Vec::with_capacity(vertex_count),
-        };
-        out.starts.push(0);
-        for part in parts {
-            let offset = out.neighbours.len() as u32;
-            out.starts.extend(part.ends.iter().map(|end| offset + end));
-            out.neighbours.extend(part.neighbours);
-            out.cotangents.extend(part.cotangents);
-            out.diagonal.extend(part.diagonal);
-            out.mass.extend(part.mass);
-        }
-        out
+        let run = |k: usize| Rows::new(k * RUN..((k + 1) * RUN).min(count), triangles, around, &corners);
+        Self { runs: (0..count.div_ceil(RUN)).into_par_iter().map(run).collect() }
     }
 
     /// Neighbours of vertex `i`, ascending, and the summed half cotangents of the edges to them.
     pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
-        let range = self.starts[i] as usize..self.starts[i + 1] as usize;
-        (&self.neighbours[range.clone()], &self.cotangents[range])
+        self.runs[i / RUN].row(i % RUN)
     }
 
     /// Neighbours of vertex `i`, ascending.
@@ -82,25 +56,33 @@ impl Laplacian {
         self.row(i).0
     }
 
-    /// `S_ii`, (V).
-    pub fn diagonal(&self) -> &[f64] {
-        &self.diagonal
+    /// `S_ii` of vertex `i`.
+    pub fn diagonal(&self, i: usize) -> f64 {
+        self.runs[i / RUN].diagonal[i % RUN]
     }
 
-    /// Voronoi area of each vertex (V), zero only where no triangle uses the vertex.
-    pub fn mass(&self) -> &[f64] {
-        &self.mass
+    /// Voronoi area of vertex `i`, zero only where no triangle uses it.
+    pub fn mass(&self, i: usize) -> f64 {
+        self.runs[i / RUN].mass[i % RUN]
     }
 }
 
 /// Smallest slack allowed in each island: a share of its mean edge, or any length at all where it has no size.
 fn island_slack(mesh: &TriMesh<'_>, triangles: &[[u32; 3]], islands: &Islands) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0usize); islands.count()];
-    for t in triangles {
+    let island_of = |t: &[u32; 3]| islands.of_vertex()[t[0] as usize] as usize;
+    let length_of = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| mesh.position(i));
-        let (length, edges) = &mut sums[islands.of_vertex()[t[0] as usize] as usize];
-        *length += a.distance(b) + b.distance(c) + c.distance(a);
-        *edges += 3;
+        a.distance(b) + b.distance(c) + c.distance(a)
+    };
+    let sum =
+        |of_one: &[[u32; 3]]| (island_of(&of_one[0]), of_one.iter().map(length_of).sum::<f64>(), 3 * of_one.len());
+    // Triangles that follow each other are mostly of one island.
+    let of_run = |run: &[[u32; 3]]| run.chunk_by(|s, t| island_of(s) == island_of(t)).map(sum).collect::<Vec<_>>();
+    let parts: Vec<_> = triangles.par_chunks(RUN).map(of_run).collect();
+    let mut sums = vec![(0.0, 0usize); islands.count()];
+    for (island, length, edges) in parts.into_iter().flatten() {
+        sums[island].0 += length;
+        sums[island].1 += edges;
     }
     let slack = |(length, edges)| if length > 0.0 { MOLLIFICATION * length / edges as f64 } else { 1.0 };
     sums.into_iter().map(slack).collect()
@@ -142,9 +124,9 @@ fn voronoi_areas(half_cotangent: [f64; 3], squared: [f64; 3], area: f64) -> [f64
 }
 
 /// The rows of S and M of a run of vertices.
-#[derive(Default)]
+#[derive(Debug)]
 struct Rows {
-    ends: Vec<u32>,
+    starts: Vec<u32>,
     neighbours: Vec<u32>,
     cotangents: Vec<f64>,
     diagonal: Vec<f64>,
@@ -153,15 +135,24 @@ struct Rows {
 
 impl Rows {
     fn new(vertices: Range<usize>, triangles: &[[u32; 3]], around: &VertexTriangles, corners: &[Corners]) -> Self {
-        let mut rows = Self::default();
+        // One neighbour for each triangle, and one more at a border.
+        let likely = vertices.clone().map(|i| around.around(i).len() + 1).sum();
+        let mut rows = Self {
+            starts: Vec::with_capacity(vertices.len() + 1),
+            neighbours: Vec::with_capacity(likely),
+            cotangents: Vec::with_capacity(likely),
+            diagonal: Vec::with_capacity(vertices.len()),
+            mass: Vec::with_capacity(vertices.len()),
+        };
+        rows.starts.push(0);
         let mut entries: Vec<(u32, f64)> = Vec::new();
         for i in vertices {
             entries.clear();
             let mut mass = 0.0;
             for &t in around.around(i) {
                 let (corner, triangle) = (&corners[t as usize], &triangles[t as usize]);
-                let k = triangle.iter().position(|&x| x as usize == i).expect("the triangle is around the vertex");
-                let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
+                let k = usize::from(triangle[1] as usize == i) + 2 * usize::from(triangle[2] as usize == i);
+                let (next, previous) = ([1, 2, 0][k], [2, 0, 1][k]);
                 entries.push((triangle[next], corner.half_cotangent[previous]));
                 entries.push((triangle[previous], corner.half_cotangent[next]));
                 mass += corner.area[k];
@@ -177,9 +168,14 @@ impl Rows {
             self.neighbours.push(edge[0].0);
             self.cotangents.push(edge.iter().map(|e| e.1).sum());
         }
-        let start = self.ends.last().map_or(0, |&end| end as usize);
+        let start = self.starts[self.mass.len()] as usize;
         self.diagonal.push(self.cotangents[start..].iter().sum());
         self.mass.push(mass);
-        self.ends.push(self.neighbours.len() as u32);
+        self.starts.push(self.neighbours.len() as u32);
+    }
+
+    fn row(&self, k: usize) -> (&[u32], &[f64]) {
+        let range = self.starts[k] as usize..self.starts[k + 1] as usize;
+        (&self.neighbours[range.clone()], &self.cotangents[range])
     }
 }

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
 use super::{Criteria, MaskValue, Settings, Source, Transfer, limit, smooth};
-use crate::adjacency::{Islands, NONE, clean_triangles};
+use crate::adjacency::{Islands, NONE, Topology};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
 use crate::mesh::TriMesh;
@@ -60,11 +60,11 @@ impl Inpainting {
         stages.end("match");
         progress.report(0.3);
         progress.check()?;
-        let (clean, around) = clean_triangles(&triangles, positions.len());
-        let islands = Islands::new(&clean, positions.len());
-        let laplacian = Laplacian::new(&mesh, &clean, &around, &islands);
+        let topology = Topology::new(&triangles, positions.len());
+        let laplacian = Laplacian::new(&mesh, &topology);
         stages.end("laplacian");
         progress.report(0.4);
+        let Topology { triangles: clean, islands, .. } = topology;
         let triangles = if clean.len() == triangles.len() { triangles } else { clean.into_owned() };
         let preparation = stages.into_seconds();
         Ok(Self {

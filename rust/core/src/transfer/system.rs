@@ -138,8 +138,8 @@ fn row_of_q(laplacian: &Laplacian, u: u32, smoothness_length: f64, sum: &mut Row
     if smoothness_length > 0.0 {
         let (neighbours, cotangents) = laplacian.row(u as usize);
         let l2 = smoothness_length * smoothness_length;
-        let scale = |a: u32, s_ua: f64| l2 * s_ua / laplacian.mass()[a as usize];
-        add_row_of_s(laplacian, u, scale(u, laplacian.diagonal()[u as usize]), sum);
+        let scale = |a: u32, s_ua: f64| l2 * s_ua / laplacian.mass(a as usize);
+        add_row_of_s(laplacian, u, scale(u, laplacian.diagonal(u as usize)), sum);
         for (&a, &cotangent) in std::iter::zip(neighbours, cotangents) {
             add_row_of_s(laplacian, a, scale(a, -cotangent), sum);
         }
@@ -148,7 +148,7 @@ fn row_of_q(laplacian: &Laplacian, u: u32, smoothness_length: f64, sum: &mut Row
 
 fn add_row_of_s(laplacian: &Laplacian, i: u32, scale: f64, sum: &mut RowSum) {
     let (neighbours, cotangents) = laplacian.row(i as usize);
-    sum.add(i, scale * laplacian.diagonal()[i as usize]);
+    sum.add(i, scale * laplacian.diagonal(i as usize));
     for (&j, &cotangent) in std::iter::zip(neighbours, cotangents) {
         sum.add(j, -scale * cotangent);
     }
