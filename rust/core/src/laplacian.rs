@@ -151,8 +151,8 @@ impl Rows {
             let mut mass = 0.0;
             for &t in around.around(i) {
                 let (corner, triangle) = (&corners[t as usize], &triangles[t as usize]);
-                let k = usize::from(triangle[1] as usize == i) + 2 * usize::from(triangle[2] as usize == i);
-                let (next, previous) = ([1, 2, 0][k], [2, 0, 1][k]);
+                let k = triangle.iter().position(|&x| x as usize == i).expect("the triangle is around the vertex");
+                let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
                 entries.push((triangle[next], corner.half_cotangent[previous]));
                 entries.push((triangle[previous], corner.half_cotangent[next]));
                 mass += corner.area[k];
