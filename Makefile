@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check bench sculpt-eval extension clean
+.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval extension clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -75,6 +75,13 @@ check: .venv/tests.stamp cargo
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	$(MAKE) test
+
+## make develop    the native module for a fast loop, in out/develop: PYTHONPATH=out/develop .venv/bin/python -m pytest ...
+develop: cargo
+	cargo build --profile develop -p skinwright-native
+	@mkdir -p out/develop
+	@cp target/develop/libskinwright_native.so out/develop/skinwright_native.abi3.so
+	@cp rust/native/skinwright_native.pyi out/develop/
 
 ## make bench      against the peers, in bench/results.md and .png; half an hour, or some sizes: make bench SIZES=5k,20k
 SIZES := 5k,20k,100k,300k,1M

@@ -25,12 +25,12 @@ def _run(command: str) -> int:
     """Leaves no trace of the add-on where it was not enabled."""
     enabled = next((name for name in bpy.context.preferences.addons.keys() if name.endswith(".skinwright")), None)
     if enabled:
-        return getattr(importlib.import_module(f"{enabled}.command_line"), command)(_arguments())
+        return getattr(importlib.import_module(f"{enabled}.headless.command_line"), command)(_arguments())
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "addon"))
     addon = importlib.import_module("skinwright")
     addon.register()
     try:
-        return getattr(addon.command_line, command)(_arguments())
+        return getattr(addon.headless.command_line, command)(_arguments())
     finally:
         addon.unregister()
 

@@ -1,9 +1,11 @@
 """Skinwright: transfer skin weights, steer the transfer with a mask, turn sculpts into weights."""
 
-from . import command_line, operators, preferences, properties, ui
+from . import operators, preferences, settings, ui
+from .headless import command_line
+from .overlay import draw
 from .scene import changes
 
-MODULES = (preferences, properties, changes, *operators.MODULES, *ui.MODULES, command_line)
+MODULES = (preferences, settings, changes, *operators.MODULES, *ui.MODULES, draw, command_line)
 
 
 def register() -> None:

@@ -21,7 +21,7 @@ def empty(n_rows: int) -> Rows:
 
 def entry_vertices(rows: Rows) -> NDArray[np.int64]:
     """(nnz,) the row of every entry."""
-    return np.repeat(np.arange(len(rows.indptr) - 1), np.diff(rows.indptr))
+    return np.repeat(np.arange(len(rows.indptr) - 1, dtype=np.int64), np.diff(rows.indptr))
 
 
 def row_sums(rows: Rows) -> NDArray[np.float64]:
@@ -36,14 +36,14 @@ def from_entries(vertex: NDArray, bone: NDArray, value: NDArray, n_rows: int) ->
     place, inverse = np.unique(vertex.astype(np.int64) * width + bone, return_inverse=True)
     total = np.bincount(inverse, weights=value, minlength=len(place))
     place, total = place[total != 0], total[total != 0]
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(place // width, minlength=n_rows))])
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(place // width, minlength=n_rows), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), (place % width).astype(np.uint32), total.astype(np.float32))
 
 
 def _keep(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
     if kept.all():
         return rows
-    indptr = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
+    indptr = np.concatenate([[0], np.cumsum(kept, dtype=np.int64)])[rows.indptr]
     return Rows(indptr.astype(np.uint32), rows.bones[kept], rows.values[kept])
 
 
@@ -57,7 +57,7 @@ def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
     if columns.all():
         return rows
     kept = keep_columns(rows, columns)
-    return kept._replace(bones=(np.cumsum(columns) - 1).astype(np.uint32)[kept.bones])
+    return kept._replace(bones=(np.cumsum(columns, dtype=np.int64) - 1).astype(np.uint32)[kept.bones])
 
 
 def keep_largest(rows: Rows, most: NDArray[np.integer]) -> Rows:
@@ -65,7 +65,7 @@ def keep_largest(rows: Rows, most: NDArray[np.integer]) -> Rows:
     vertex = entry_vertices(rows)
     order = np.lexsort((rows.bones, -rows.values, vertex))
     rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order)) - rows.indptr[vertex[order]]
+    rank[order] = np.arange(len(order), dtype=np.int64) - rows.indptr[vertex[order]]
     return _keep(rows, rank < most[vertex])
 
 
@@ -82,9 +82,9 @@ def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
 
 def take_rows(rows: Rows, indices: NDArray[np.integer]) -> Rows:
     """The rows of these indices, in their order."""
-    if np.array_equal(indices, np.arange(len(rows.indptr) - 1)):
+    if np.array_equal(indices, np.arange(len(rows.indptr) - 1, dtype=np.int64)):
         return rows
     counts = np.diff(rows.indptr)[indices].astype(np.int64)
-    indptr = np.concatenate([[0], np.cumsum(counts)])
-    entries = np.arange(indptr[-1]) + np.repeat(rows.indptr[indices] - indptr[:-1], counts)
+    indptr = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+    entries = np.arange(indptr[-1], dtype=np.int64) + np.repeat(rows.indptr[indices] - indptr[:-1], counts)
     return Rows(indptr.astype(np.uint32), rows.bones[entries], rows.values[entries])

@@ -54,7 +54,7 @@ def script(*arguments):
 @pytest.fixture
 def transfer(addon):
     """The command in this process."""
-    return lambda *arguments: addon.command_line.transfer([str(a) for a in arguments])
+    return lambda *arguments: addon.headless.command_line.transfer([str(a) for a in arguments])
 
 
 def loaded(path, name):
@@ -193,10 +193,10 @@ class TestInThisProcess:
         assert (again.max_distance, again.mask, again.island_policy) == (0.25, params.mask, "rigid")
 
     def test_main(self, addon, coat, capsys):
-        assert addon.command_line.main(["transfer", "--source", "Body", "--target", "Coat"]) == 0
-        assert addon.command_line.main(["--version"]) == 0
+        assert addon.headless.command_line.main(["transfer", "--source", "Body", "--target", "Coat"]) == 0
+        assert addon.headless.command_line.main(["--version"]) == 0
         assert addon.native.addon_version() in capsys.readouterr().out
-        assert addon.command_line.main(["transfer", "--help"]) == 0
+        assert addon.headless.command_line.main(["transfer", "--help"]) == 0
         assert 'island_policy "bridge"' in " ".join(capsys.readouterr().out.split())
-        assert addon.command_line.main([]) == 2
-        assert addon.command_line.main(["dance"]) == 2
+        assert addon.headless.command_line.main([]) == 2
+        assert addon.headless.command_line.main(["dance"]) == 2

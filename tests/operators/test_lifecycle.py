@@ -61,9 +61,9 @@ def test_the_command_is_taken_away(addon, monkeypatch):
     taken_away = []
     monkeypatch.setattr(bpy.utils, "register_cli_command", lambda name, function: (name, function))
     monkeypatch.setattr(bpy.utils, "unregister_cli_command", taken_away.append)
-    addon.command_line.register()
-    addon.command_line.unregister()
-    assert taken_away == [("skinwright", addon.command_line.main)]
+    addon.headless.command_line.register()
+    addon.headless.command_line.unregister()
+    assert taken_away == [("skinwright", addon.headless.command_line.main)]
 
 
 def skinwright_operators():
@@ -75,7 +75,7 @@ def test_names_and_descriptions(addon):
     operators = skinwright_operators()
     for rna in operators:
         assert rna.name and rna.description and not rna.description.endswith("."), rna.identifier
-    for rna in [*operators, *(cls.bl_rna for cls in addon.properties.CLASSES[:2])]:
+    for rna in [*operators, *(cls.bl_rna for cls in addon.settings.CLASSES[:2])]:
         for prop in rna.properties:
             if prop.identifier in ("rna_type", "name") or rna.identifier.endswith("preset_add"):
                 continue
@@ -85,7 +85,7 @@ def test_names_and_descriptions(addon):
 def test_panel_and_operator_have_the_same_settings(addon):
     operator = bpy.ops.skinwright.transfer_weights.get_rna_type().properties
     panel = bpy.context.scene.skinwright.transfer.bl_rna.properties
-    for name in addon.properties.TransferOptions.__annotations__:
+    for name in addon.settings.TransferOptions.__annotations__:
         pair = operator[name], panel[name]
         assert len({prop.type for prop in pair}) == len({prop.description for prop in pair}) == 1
         assert pair[0].default == pair[1].default

@@ -31,7 +31,7 @@ def coat(scene, native):
 @pytest.fixture
 def session(coat):
     assert bpy.ops.skinwright.preview_match() == {"FINISHED"}
-    yield import_module(f"{PACKAGE}.match_session").current
+    yield import_module(f"{PACKAGE}.match.session").current
     if bpy.context.scene.skinwright.overlay.kind == "MATCH":
         bpy.ops.skinwright.preview_match()
 
@@ -72,7 +72,7 @@ def test_the_mask_decides(coat, session):
 def test_second_press_turns_it_off(coat, session):
     bpy.ops.skinwright.preview_match()
     assert bpy.context.scene.skinwright.overlay.kind == "NONE"
-    assert import_module(f"{PACKAGE}.match_session").current is None
+    assert import_module(f"{PACKAGE}.match.session").current is None
 
 
 @pytest.mark.parametrize(("what", "number"), [("UNMATCHED", 39), ("MATCHED", 45), ("LOOSE", 3)])
@@ -150,7 +150,7 @@ class TestPainting:
         builders.paint(coat, Arm__L=0.3, Old=0.7)
         coat.vertex_groups.active_index = 1
         self.before = builders.weights(coat)
-        mask_painting = import_module(f"{PACKAGE}.mask_painting")
+        mask_painting = import_module(f"{PACKAGE}.match.painting")
         return mask_painting.MaskPainting(bpy.context, coat, params())
 
     def settle(self, painting):

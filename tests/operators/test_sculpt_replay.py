@@ -87,7 +87,7 @@ def test_frames(recorded, tmp_path, addon):
         bone.keyframe_insert("rotation_quaternion", frame=frame)
     path = tmp_path / "frames.npz"
     np.savez(path, positions=np.load(sculpts)["positions"], frames=[10, 20])
-    assert addon.command_line.sculpt(["--target", "Body", "--sculpts", str(path)]) == 0
+    assert addon.headless.command_line.sculpt(["--target", "Body", "--sculpts", str(path)]) == 0
     assert np.abs(builders.dense(body, BONES) - true)[12:].mean() < 0.1
     assert bpy.context.scene.frame_current == 1
 
@@ -107,7 +107,7 @@ def test_what_does_not_fit_is_refused_with_nothing_changed(recorded, tmp_path, a
     before = builders.weights(bpy.data.objects["Body"])
     path = tmp_path / "bad.npz"
     np.savez(path, **arrays)
-    assert addon.command_line.sculpt(["--target", "Body", "--sculpts", str(path)]) == 1
+    assert addon.headless.command_line.sculpt(["--target", "Body", "--sculpts", str(path)]) == 1
     assert sentence in capsys.readouterr().err
     assert builders.weights(bpy.data.objects["Body"]) == before
 

@@ -16,7 +16,7 @@ def sculpt(addon):
     """The module under test."""
     from importlib import import_module
 
-    return import_module(f"{addon.__name__}.sculpt_session")
+    return import_module(f"{addon.__name__}.sculpt.session")
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ def changes(addon, monkeypatch):
 
 @pytest.fixture
 def watch(addon, changes, session):
-    return import_module(f"{addon.__name__}.operators.sculpt_watch").StrokeWatch(session)
+    return import_module(f"{addon.__name__}.operators.sculpt.watch").StrokeWatch(session)
 
 
 def test_each_change_is_looked_at_once(watch, changes, session):

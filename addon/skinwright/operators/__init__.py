@@ -1,27 +1,6 @@
-"""Operators, one family a file."""
+"""Operators, one file or folder per feature."""
 
-from . import (
-    check_weights,
-    desparsify,
-    edit_match_mask,
-    paint_match_mask,
-    presets,
-    preview_match,
-    sculpt_keys,
-    sculpt_weights,
-    timers,
-    transfer_weights,
-)
+from . import check_weights, desparsify, match, presets, sculpt, transfer_weights
+from .modal import timers
 
-MODULES = (
-    timers,
-    transfer_weights,
-    presets,
-    preview_match,
-    edit_match_mask,
-    paint_match_mask,
-    check_weights,
-    desparsify,
-    sculpt_keys,
-    sculpt_weights,
-)
+MODULES = (timers, transfer_weights, presets, *match.MODULES, check_weights, desparsify, *sculpt.MODULES)

@@ -10,7 +10,7 @@ from bpy.types import Context, Operator
 
 from ..scene import mesh
 from ..scene.error import SceneError
-from ..weight_check import Fault, Limits, WeightCheck, check
+from ..check.weight_check import Fault, Limits, WeightCheck, check
 
 FAULTS = [(fault.name, fault.name.replace("_", " ").title(), f"Vertices {fault.value}") for fault in Fault]
 

@@ -7,7 +7,7 @@ from .. import native, preferences
 from ..desparsify import desparsify
 from ..scene import mesh
 from ..scene.error import SceneError
-from ..sculpt_properties import DesparsifyOptions
+from ..settings.sculpt import DesparsifyOptions
 
 MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
 

@@ -6,7 +6,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.types import Operator
 
-from ..properties import TransferOptions
+from ..settings import TransferOptions
 
 PRESET_PATH = os.path.dirname(os.path.dirname(__file__))
 

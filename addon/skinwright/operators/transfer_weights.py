@@ -5,11 +5,11 @@ from bpy.props import BoolProperty
 from bpy.types import Context, Event, Object
 
 from .. import native, preferences
-from ..properties import TransferOptions
+from ..settings import TransferOptions
 from ..reporting import Report
 from ..scene.error import SceneError
 from ..transfer import TransferParams, steps, transfer_weights
-from .long_work import LongWork
+from .modal.long_work import LongWork
 
 MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
 # Below this a transfer takes less than the blink of a progress bar.

@@ -99,7 +99,7 @@ def agrees_with_api(vertices: np.ndarray, mesh: bpy.types.Mesh) -> bool:
 def gather(vertices: np.ndarray) -> DeformArray | None:
     """Each vertex has an allocation of its own; one view from the lowest to the highest reaches them all."""
     counts = vertices["count"].astype(np.int64)
-    indptr = np.concatenate(([0], np.cumsum(counts)))
+    indptr = np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
     used = counts != 0
     if not used.any():
         return DeformArray(np.empty(0, INFLUENCE), np.empty(0, np.int64), indptr)
@@ -109,7 +109,7 @@ def gather(vertices: np.ndarray) -> DeformArray | None:
         return None
     first = (addresses - lowest) // INFLUENCE.itemsize
     memory = as_array(lowest, int((first + counts)[used].max()), INFLUENCE)
-    entries = np.repeat(first - indptr[:-1], counts) + np.arange(indptr[-1])
+    entries = np.repeat(first - indptr[:-1], counts) + np.arange(indptr[-1], dtype=np.int64)
     return DeformArray(memory, entries, indptr)
 
 

@@ -75,13 +75,13 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     indices = [obj.vertex_groups.find(_stored(name)) for name in names]
     if all(index < 0 for index in indices):
         return csr.empty(n)
-    held = _memberships(obj.data, np.arange(n))
+    held = _memberships(obj.data, np.arange(n, dtype=np.int64))
     column = _lookup(indices, held.group)
     keep = column >= 0
     vertex, column, values = held.row[keep], column[keep], held.values[keep]
     _check_finite(obj, names, vertex, column, values)
     order = np.argsort(vertex * len(names) + column, kind="stable")
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n))])
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
 
 
@@ -93,8 +93,8 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     """
     owned = np.array([group.index for group in ensure(obj, names)], np.int64)
     mesh = obj.data
-    indices = np.arange(len(mesh.vertices)) if vertices is None else np.asarray(vertices)
-    row, group = np.repeat(np.arange(len(indices)), np.diff(rows.indptr)), owned[rows.bones]
+    indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
+    row, group = np.repeat(np.arange(len(indices), dtype=np.int64), np.diff(rows.indptr)), owned[rows.bones]
     held = _memberships(mesh, indices)
     if _change_members(obj, indices, held, owned, row, group):
         held = _memberships(mesh, indices)
@@ -150,7 +150,7 @@ def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Membersh
     if array is None:
         return _from_api(mesh, indices)
     counts = np.diff(array.indptr)
-    row = np.repeat(np.arange(len(counts)), counts)
+    row = np.repeat(np.arange(len(counts), dtype=np.int64), counts)
     return Memberships(row, array.groups().astype(np.int64), array.weights(), array)
 
 
@@ -164,7 +164,7 @@ def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships
         for member in members:
             groups.append(member.group)
             values.append(member.weight)
-    row = np.repeat(np.arange(len(indices)), np.array(counts, np.int64))
+    row = np.repeat(np.arange(len(indices), dtype=np.int64), np.array(counts, np.int64))
     return Memberships(row, np.array(groups, np.int64), np.array(values, np.float32))
 
 
@@ -187,7 +187,7 @@ def _set_weights(
     if held.array:
         held.array.set_weights(now)
         return
-    ends = np.cumsum(np.bincount(held.row, minlength=len(indices)))
+    ends = np.cumsum(np.bincount(held.row, minlength=len(indices)), dtype=np.int64)
     for r in np.unique(row).tolist():
         start = ends[r - 1] if r else 0
         mesh.vertices[indices[r]].groups.foreach_set("weight", now[start : ends[r]])
@@ -205,8 +205,8 @@ def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator
 
 
 def _keys(row: NDArray[np.int64], group: NDArray[np.int64]) -> NDArray[np.int64]:
-    """One number a membership. Blender has at most 2^31 groups."""
-    return row << 31 | group
+    """One number per membership: 64 bits, whatever NumPy counts in. Blender has at most 2^31 groups."""
+    return row.astype(np.int64) << 31 | group
 
 
 def _find(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -221,7 +221,7 @@ def _lookup(groups: list[int], group: NDArray[np.int64]) -> NDArray[np.int64]:
     """Position of each group index in `groups`, or -1. A mesh may hold indices beyond its object's list of groups."""
     beyond = max(groups, default=-1) + 1
     column = np.full(beyond + 2, -1, np.int64)
-    column[groups] = np.arange(len(groups))
+    column[groups] = np.arange(len(groups), dtype=np.int64)
     column[-1] = -1  # where a missing group's index, -1, has landed
     return column[np.minimum(group, beyond)]
 

@@ -15,7 +15,7 @@ def pack(fields: Rows, n: int) -> Rows:
     n_rows = len(fields.indptr) - 1
     rest = np.clip(1 - csr.row_sums(fields) / n, 0, 1)
     return csr.from_entries(
-        np.concatenate([csr.entry_vertices(fields), np.arange(n_rows)]),
+        np.concatenate([csr.entry_vertices(fields), np.arange(n_rows, dtype=np.int64)]),
         np.concatenate([fields.bones, np.full(n_rows, n)]),
         np.concatenate([fields.values / n, rest]),
         n_rows,
@@ -24,5 +24,5 @@ def pack(fields: Rows, n: int) -> Rows:
 
 def unpack(rows: Rows, n: int) -> Rows:
     """The inverse of pack."""
-    fields = csr.keep_columns(rows, np.arange(n + 1) < n)
+    fields = csr.keep_columns(rows, np.arange(n + 1, dtype=np.int64) < n)
     return fields._replace(values=np.minimum(fields.values * np.float32(n), 1))

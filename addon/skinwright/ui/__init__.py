@@ -1,5 +1,5 @@
 """Panels and menus. Operators are named by bl_idname only."""
 
-from . import match_panel, menus, overlay, panel, sculpt_panel
+from . import match_panel, menus, panel, sculpt_panel
 
-MODULES = (panel, match_panel, sculpt_panel, menus, overlay)
+MODULES = (panel, match_panel, sculpt_panel, menus)

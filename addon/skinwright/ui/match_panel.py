@@ -3,7 +3,7 @@
 import bpy
 from bpy.types import Context, Panel, UILayout
 
-from ..match_session import current_of
+from ..match.session import current_of
 from .panel import Tab
 
 BRUSH_VALUES = (("Inpaint", 0.0), ("Automatic", 0.5), ("Match", 1.0))

@@ -3,8 +3,8 @@
 import bpy
 from bpy.types import Context, Panel, UILayout
 
-from .. import sculpt_session
-from ..sculpt_session import SculptSession
+from ..sculpt import session as sculpt_session
+from ..sculpt.session import SculptSession
 from .panel import Tab
 
 

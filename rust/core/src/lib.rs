@@ -9,7 +9,6 @@ pub mod adjacency;
 pub mod desparsify;
 pub mod error;
 pub mod laplacian;
-pub mod linear_solve;
 pub mod mesh;
 pub mod progress;
 pub mod sculpt;

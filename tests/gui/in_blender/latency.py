@@ -46,7 +46,7 @@ def steps(window: Window) -> Steps:
 
 def overlay_seconds(window: Window) -> list[float]:
     """What the overlay adds to a drawing when something has changed: values, shape, upload."""
-    overlay, preview = (import_module(f"{EXTENSION}.{name}") for name in ("ui.overlay", "preview"))
+    overlay, preview = (import_module(f"{EXTENSION}.{name}") for name in ("overlay.draw", "overlay.picture"))
     seconds = []
     for _ in range(STROKES):
         preview._kept = None

@@ -44,7 +44,7 @@ def steps(window: Window) -> Steps:
         bpy.ops.skinwright.preview_match()
     yield from window.screenshot("preview")
     assert weights() == bare
-    session = import_module(f"{EXTENSION}.match_session").current
+    session = import_module(f"{EXTENSION}.match.session").current
     few = session.last_match.counts().tolist()
     bpy.context.scene.skinwright.transfer.relative_max_distance = 0.12
     yield from window.screenshot("preview_slider")

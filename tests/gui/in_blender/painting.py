@@ -22,7 +22,7 @@ def brush(window: Window) -> None:
 
 
 def painting():
-    return import_module(f"{EXTENSION}.operators.paint_match_mask").SKINWRIGHT_OT_paint_match_mask.painting
+    return import_module(f"{EXTENSION}.operators.match.paint_mask").SKINWRIGHT_OT_paint_match_mask.painting
 
 
 def look(window: Window) -> None:

@@ -53,7 +53,7 @@ def watch() -> None:
     timed(modules["scene.rest_shape"], "moved", part("look"))
     timed(modules["scene.vertex_groups"], "write", part("write"))
     timed(modules["scene.rest_shape"], "restore", part("put back"))
-    timed(import_module(f"{EXTENSION}.sculpt_session").SculptSession, "stroke", stroke)
+    timed(import_module(f"{EXTENSION}.sculpt.session").SculptSession, "stroke", stroke)
     pairs(bpy.app.handlers.depsgraph_update_pre.append, bpy.app.handlers.depsgraph_update_post.append, evaluated)
     view = bpy.types.SpaceView3D.draw_handler_add
     pairs(lambda f: view(f, (), "WINDOW", "PRE_VIEW"), lambda f: view(f, (), "WINDOW", "POST_PIXEL"), drawn)

@@ -37,7 +37,7 @@ def character(window: Window, vertices: int, bones: int = 6) -> bpy.types.Object
 
 
 def session():
-    return import_module(f"{EXTENSION}.sculpt_session").current
+    return import_module(f"{EXTENSION}.sculpt.session").current
 
 
 def positions() -> np.ndarray:

@@ -9,7 +9,7 @@ use super::Source;
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
-use crate::linear_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
+use skinwright_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
 use crate::mesh::TriMesh;
 use crate::surface::SurfacePoint;
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::adjacency::{DisjointSets, NONE};
 use crate::laplacian::Laplacian;
-use crate::linear_solve::SymmetricMatrix;
+use skinwright_solve::SymmetricMatrix;
 
 /// Rows a worker assembles at a time.
 const ROWS_A_RUN: usize = 1024;

@@ -1,0 +1,1 @@
+"""What is wrong with weights, in numbers and in test poses."""

@@ -1,0 +1,87 @@
+"""Desparsification: every vertex gets bones to choose from, as members of weight 0 (spec-sculpt, section 5)."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import csr, native
+from ..csr import Rows
+from ..reporting import DesparsifyReport
+from ..scene import armature, mesh, sculpting, vertex_groups
+from ..scene.error import SceneError
+
+
+@dataclass(frozen=True)
+class DesparsifyParams:
+    """`n` members a vertex, found by `method` (see the native stub); `threads` 0 takes all."""
+
+    n: int = 4
+    method: Literal["surface", "hop"] = "surface"
+    selected_only: bool = False
+    threads: int = 0
+
+
+def desparsify(obj: bpy.types.Object, params: DesparsifyParams) -> DesparsifyReport:
+    """Give vertices of `obj` exactly n deforming bones: the largest they have, and near ones at weight 0.
+
+    Locked groups and groups that are no deforming bones stay as they are. Nothing is written if an error is raised.
+    Raises SceneError and native.NativeError.
+    """
+    rig = _check(obj)
+    names = [bone.name for bone in rig.data.bones]
+    deforming = np.isin(names, sorted(armature.deform_bones(rig)))
+    before = csr.keep_columns(vertex_groups.read(obj, names), deforming)
+    after = _solve(obj, rig, names, deforming, before, params)
+    vertices = np.flatnonzero(mesh.selected(obj)) if params.selected_only else np.arange(len(obj.data.vertices), dtype=np.int64)
+    return _write(obj, names, vertices, before, after, params.n)
+
+
+def _check(obj: bpy.types.Object) -> bpy.types.Object:
+    sculpting.check_editable(obj)
+    rig = armature.find(obj)
+    if rig is None:
+        raise SceneError(f"{obj.name} has no armature to take bones from: give it an Armature modifier")
+    if not armature.deform_bones(rig):
+        raise SceneError(f"{rig.name}, which deforms {obj.name}, has no bone that deforms: turn Deform on for some")
+    return rig
+
+
+def _solve(
+    obj: bpy.types.Object,
+    rig: bpy.types.Object,
+    names: list[str],
+    deforming: NDArray[np.bool_],
+    before: Rows,
+    params: DesparsifyParams,
+) -> Rows:
+    """Bones that do not deform take part as steps of the hierarchy, but are given to no vertex."""
+    locked = ~deforming | np.isin(names, sorted(vertex_groups.locked(obj)))
+    shape: dict[str, NDArray] = {}
+    if params.method == "surface":
+        shape["positions"], shape["triangles"] = mesh.rest_positions(obj.data), mesh.triangles(obj)
+        shape["bone_segments"] = armature.segments(obj, rig, names)
+    parents = armature.parents(rig, names)
+    options = {"n": params.n, "method": params.method, "locked": locked, "threads": params.threads}
+    return native.desparsify(obj.name, before, len(names), parents, **options, **shape)
+
+
+def _write(
+    obj: bpy.types.Object, names: list[str], vertices: NDArray[np.intp], before: Rows, after: Rows, n: int
+) -> DesparsifyReport:
+    before, after = csr.take_rows(before, vertices), csr.take_rows(after, vertices)
+    present = {group.name for group in obj.vertex_groups}
+    used = np.isin(np.arange(len(names), dtype=np.int64), np.concatenate([before.bones, after.bones]))
+    needed = [name for name, is_used in zip(names, used, strict=True) if is_used]
+    vertex_groups.write(obj, needed, csr.take_columns(after, used), vertices)
+    old, new = (csr.entry_vertices(rows) * len(names) + rows.bones for rows in (before, after))
+    return DesparsifyReport(
+        target=obj.name,
+        vertices=len(vertices),
+        n=n,
+        added=int((~np.isin(new, old)).sum()),
+        dropped=int((~np.isin(old, new) & (before.values > 0)).sum()),
+        groups=[name for name in needed if name not in present],
+    )

@@ -1,0 +1,78 @@
+"""Work that may take seconds: on Rust's threads, with a progress bar, and Esc stops it with nothing written."""
+
+from typing import Any
+
+from bpy.types import Context, Event, Operator
+
+from ... import jobs, native
+from ...scene.error import SceneError
+from . import timers
+
+TICK_SECONDS = 0.05
+
+
+class LongWork(Operator):
+    """Base of an operator: `begin` starts the work, `complete` gets what it gave."""
+
+    def complete(self, context: Context, result: Any) -> set[str]:
+        """Say what was done."""
+        raise NotImplementedError
+
+    def begin(self, context: Context, steps: jobs.Jobs[Any]) -> set[str]:
+        """Start; what is done by then is completed at once."""
+        try:
+            runner = jobs.Runner(steps)
+        except (SceneError, native.NativeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if runner.done:
+            return self.complete(context, runner.result)
+        self._runner = jobs.running = runner
+        self._timer = timers.start(context, TICK_SECONDS)
+        context.window_manager.modal_handler_add(self)
+        _show(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Context, event: Event) -> set[str]:
+        """Everything but Esc waits: the scene must not change between reading and writing."""
+        runner = self._runner
+        if event.type == "ESC" and event.value == "PRESS":
+            self.cancel(context)
+            self.report({"INFO"}, "Stopped; nothing was written")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            runner.poll()
+        except (SceneError, native.NativeError) as error:
+            self._end(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except BaseException:
+            # Else the timer would come back to it for ever.
+            self._end(context)
+            raise
+        _show(context)
+        if not runner.done:
+            return {"RUNNING_MODAL"}
+        self._end(context)
+        return self.complete(context, runner.result)
+
+    def cancel(self, context: Context) -> None:
+        """Also called by Blender, when it loads a file or quits."""
+        self._runner.cancel()
+        self._end(context)
+
+    def _end(self, context: Context) -> None:
+        jobs.running = None
+        timers.stop(self._timer)
+        _show(context)
+
+
+def _show(context: Context) -> None:
+    runner = jobs.running
+    text = f"Skinwright: {runner.progress:.0%}   Esc: stop, nothing is written" if runner else None
+    context.workspace.status_text_set(text)
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            area.tag_redraw()

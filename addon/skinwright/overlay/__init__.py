@@ -1,0 +1,1 @@
+"""Colours over a mesh: what they show, and how they are drawn."""

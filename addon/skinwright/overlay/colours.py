@@ -1,0 +1,43 @@
+"""Colours of values on vertices; all but the influence counts can be told apart by the colour-blind."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# By match_session.Category: blues match, oranges are inpainted. Okabe & Ito, Color Universal Design, 2008.
+CATEGORIES = np.array(
+    [(86, 180, 233), (230, 159, 0), (0, 114, 178), (213, 94, 0), (204, 121, 167)],
+    np.float32,
+) / np.float32(255)
+
+# No influence, then 1 to 4, then more: what riggers know from other tools.
+INFLUENCES = np.array(
+    [(0.1, 0.1, 0.1), (0.85, 0.12, 0.1), (0.95, 0.5, 0.05), (0.95, 0.85, 0.1), (0.25, 0.7, 0.2), (0.15, 0.35, 0.9)],
+    np.float32,
+)
+
+# Pressed to half its length or less, as at rest, stretched to twice its length or more.
+STRETCH = np.array([(0.13, 0.4, 0.67), (0.57, 0.77, 0.87), (0.96, 0.96, 0.96), (0.96, 0.65, 0.51), (0.7, 0.09, 0.17)])
+
+
+def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
+    """(V, 3) of what a preview.Picture of this kind holds."""
+    if kind == "MATCH":
+        return of_categories(values)
+    return of_influences(values) if kind == "INFLUENCES" else of_stretch(values)
+
+
+def of_categories(category: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(V, 3) of categories (V,)."""
+    return CATEGORIES[category]
+
+
+def of_influences(count: NDArray[np.integer]) -> NDArray[np.float32]:
+    """(V, 3) of the number of influences (V,)."""
+    return INFLUENCES[np.minimum(count, 5)]
+
+
+def of_stretch(stretch: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(V, 3) of the base-2 logarithm (V,) of length now over length at rest."""
+    at = np.clip(np.nan_to_num(stretch), -1, 1) * 2 + 2
+    steps = np.arange(len(STRETCH), dtype=np.int64)
+    return np.stack([np.interp(at, steps, STRETCH[:, channel]) for channel in range(3)], axis=1).astype(np.float32)

@@ -1,0 +1,1 @@
+"""Sculpting turned into weights: the session, and its replay without a window."""

@@ -1,0 +1,93 @@
+"""Recorded or synthetic sculpts from a file, for studios and for tests.
+
+An .npz file holds one sculpt a pose: `positions` (S, V, 3), where each vertex is to be in the mesh' own space, NaN
+where it was not touched; and the poses, either `frames` (S,) of the scene, or `bones` (B,) with `matrices`
+(S, B, 4, 4), the `matrix_basis` of these pose bones.
+"""
+
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..reporting import SculptReport
+from ..scene import poses
+from ..scene.error import SceneError
+from .session import SculptOptions, SculptSession
+
+Sculpts = dict[str, NDArray]
+
+
+def read(path: Path) -> Sculpts:
+    """The arrays of a file. Raises SceneError where they do not fit together."""
+    try:
+        with np.load(path) as file:
+            sculpts = {name: file[name] for name in file.files}
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{path} cannot be read as an .npz file: {error}") from error
+    problem = _problem(sculpts)
+    if problem:
+        raise SceneError(f"{path}: {problem}")
+    return sculpts
+
+
+def _problem(sculpts: Sculpts) -> str:
+    if "positions" not in sculpts or sculpts["positions"].ndim != 3 or sculpts["positions"].shape[2] != 3:
+        return "it needs an array `positions` of shape (sculpts, vertices, 3)"
+    count = len(sculpts["positions"])
+    if "frames" in sculpts:
+        return "" if sculpts["frames"].shape == (count,) else f"`frames` must have shape ({count},)"
+    if "bones" not in sculpts or "matrices" not in sculpts:
+        return "it needs `frames`, or `bones` and `matrices`, to say in which pose was sculpted"
+    expected = (count, len(sculpts["bones"]), 4, 4)
+    return "" if sculpts["matrices"].shape == expected else f"`matrices` must have shape {expected}"
+
+
+def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptOptions) -> SculptReport:
+    """Sculpt `obj` to all of them; afterwards pose and frame are as before.
+
+    Raises SceneError or native.NativeError with the object as it was.
+    """
+    n = sculpts["positions"].shape[1]
+    if n != len(obj.data.vertices):
+        raise SceneError(f"{obj.name} has {len(obj.data.vertices)} vertices, but {n} were sculpted: use the same mesh")
+    session = SculptSession(obj, options)
+    try:
+        for number in _poses(bpy.data.objects[session.rig_name], sculpts):
+            positions = sculpts["positions"][number]
+            touched = np.flatnonzero(np.isfinite(positions).all(axis=1))
+            session.sculpt(touched, positions[touched].astype(np.float32))
+    except ValueError:
+        session.cancel()
+        raise
+    return session.commit()
+
+
+def _poses(rig: bpy.types.Object, sculpts: Sculpts) -> Iterator[int]:
+    if "frames" in sculpts:
+        return poses.frames(sculpts["frames"].tolist())
+    names = sculpts["bones"].tolist()
+    missing = [name for name in names if name not in rig.pose.bones]
+    if missing:
+        raise SceneError(f"{rig.name} has no bone {missing[0]}, which was posed: use the same armature")
+    return poses.recorded(rig, names, sculpts["matrices"])
+
+
+def options_from_json(settings: Any) -> SculptOptions:
+    """Options from a JSON object of their names. Raises ValueError for another name or type."""
+    if not isinstance(settings, dict):
+        raise ValueError(f"settings must be a JSON object, not {settings!r}")
+    known = {field.name: field.type for field in fields(SculptOptions)}
+    for name, value in settings.items():
+        if name not in known:
+            raise ValueError(f"there is no setting {name}; there are {', '.join(sorted(known))}")
+        kind: Any = known[name]
+        accepted: Any = {float: (int, float), int: int}.get(kind, str)
+        choices = get_args(kind) if get_origin(kind) else ()
+        if isinstance(value, bool) or not isinstance(value, accepted) or (choices and value not in choices):
+            raise ValueError(f"setting {name} cannot be {value!r}")
+    return SculptOptions(**settings)

@@ -1,0 +1,45 @@
+"""The settings as Blender properties: one group per feature, kept in the scene and on objects."""
+
+import bpy
+from bpy.props import PointerProperty
+from bpy.types import Object, PropertyGroup, Scene
+
+from .overlay import SKINWRIGHT_PG_overlay
+from .sculpt import SKINWRIGHT_PG_sculpt
+from .target import SKINWRIGHT_PG_object
+from .transfer import SKINWRIGHT_PG_transfer, TransferOptions
+
+__all__ = ["CLASSES", "TransferOptions", "register", "unregister"]
+
+
+class SKINWRIGHT_PG_scene(PropertyGroup):
+    """All of Skinwright's settings in a scene, one group a feature."""
+
+    transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
+    overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
+    sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
+
+
+CLASSES = (
+    SKINWRIGHT_PG_transfer,
+    SKINWRIGHT_PG_object,
+    SKINWRIGHT_PG_overlay,
+    SKINWRIGHT_PG_sculpt,
+    SKINWRIGHT_PG_scene,
+)
+
+
+def register() -> None:
+    """Add the settings to scenes and objects."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    Scene.skinwright = PointerProperty(type=SKINWRIGHT_PG_scene)
+    Object.skinwright = PointerProperty(type=SKINWRIGHT_PG_object)
+
+
+def unregister() -> None:
+    """Take them away again."""
+    del Object.skinwright
+    del Scene.skinwright
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

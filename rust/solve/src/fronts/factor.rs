@@ -1,0 +1,198 @@
+//! The multifrontal factorisation: each front gathers matrix entries and its children's updates, eliminates its columns
+//! and passes on what is left (Duff and Reid 1983; Liu 1992).
+
+use std::ops::Range;
+
+use pulp::Arch;
+
+use crate::fronts::blocks::{BLOCK, FORK, middle_row, panel_index};
+use crate::fronts::buffer::Buffer;
+use crate::fronts::extend_add::{Child, add_children};
+use crate::ordering::graph::Graph;
+use crate::kernels::{Eliminate, Pivot, Product};
+use crate::fronts::tree::{Front, Tree};
+use crate::fronts::walk::{Plan, Received, Visit, walk};
+use crate::{NotPositive, pivot_floor};
+
+/// Block columns that are eliminated on one thread before all threads use them on the rows below.
+const PIVOT_BLOCKS: usize = 16;
+
+/// Factors the matrix of `graph` along `tree`. Returns all panels, one after the other.
+pub(crate) fn factor(tree: &Tree, graph: &Graph, arch: Arch) -> Result<Buffer, NotPositive> {
+    let plan = Plan::new(tree, |index| tree.fronts[index].update_len());
+    let root = tree.root();
+    let mut panels = Buffer::zeroed(tree.fronts[root].subtree_panels);
+    let (own, other) = plan.stacks(root);
+    let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
+    walk(tree, &plan, &Factor { tree, graph, arch }, root, &mut panels, &mut own, &mut other)?;
+    Ok(panels)
+}
+
+struct Factor<'a> {
+    tree: &'a Tree,
+    graph: &'a Graph<'a>,
+    arch: Arch,
+}
+
+impl Visit for Factor<'_> {
+    type Error = NotPositive;
+
+    fn store_len(&self, front: &Front) -> usize {
+        front.panel_len()
+    }
+
+    fn subtree_store_len(&self, front: &Front) -> usize {
+        front.subtree_panels
+    }
+
+    fn passed_len(&self, index: usize) -> usize {
+        self.tree.fronts[index].update_len()
+    }
+
+    fn visit(
+        &self,
+        index: usize,
+        panel: &mut [f64],
+        update: &mut [f64],
+        received: Received,
+    ) -> Result<(), NotPositive> {
+        let front = &self.tree.fronts[index];
+        self.assemble(front, panel);
+        let children: Vec<Child> = front
+            .children
+            .iter()
+            .map(|&index| {
+                let child = &self.tree.fronts[index];
+                Child::new(self.arch, &child.in_parent, front.columns, received.from(index, child.update_len()))
+            })
+            .collect();
+        let mut rows = row_blocks(panel, front.columns);
+        if front.columns == 0 {
+            update.fill(0.0);
+        } else {
+            children.iter().for_each(|child| child.add_to_panel(&mut rows));
+        }
+        self.eliminate_columns(front, &mut rows)?;
+        let lower: Vec<&[f64]> = rows[front.columns.div_ceil(BLOCK)..].iter().map(|row| &**row).collect();
+        let mut update = update_blocks(update);
+        product(self.arch, &lower, &lower, &mut update, 0, true);
+        add_children(&mut update, 0, &children);
+        Ok(())
+    }
+}
+
+impl Factor<'_> {
+    /// Puts the matrix entries of the front's columns into its empty panel.
+    fn assemble(&self, front: &Front, panel: &mut [f64]) {
+        let end = front.start + front.columns;
+        for (column, &unknown) in self.tree.order[front.start..end].iter().enumerate() {
+            panel[panel_index(front.columns, column, column)] = self.graph.diagonal(unknown as usize);
+            for (j, value) in self.graph.entries(unknown as usize) {
+                let place = self.tree.place[j] as usize;
+                if place <= front.start + column {
+                    continue;
+                }
+                let row = match place < end {
+                    true => place - front.start,
+                    false => front.columns + front.rows.partition_point(|&row| (row as usize) < place),
+                };
+                panel[panel_index(front.columns, row, column)] = value;
+            }
+        }
+    }
+
+    /// Left-looking elimination, [`PIVOT_BLOCKS`] block columns at a time.
+    fn eliminate_columns(&self, front: &Front, rows: &mut [&mut [f64]]) -> Result<(), NotPositive> {
+        let k = front.columns;
+        let blocks = k.div_ceil(BLOCK);
+        for first in (0..blocks).step_by(PIVOT_BLOCKS) {
+            let last = blocks.min(first + PIVOT_BLOCKS);
+            subtract_earlier(self.arch, &mut rows[first..], first, last - first);
+            for block in first..last {
+                let (pivots, rest) = rows.split_at_mut(block);
+                eliminate(self.arch, pivots, &mut rest[..1], first..block, k);
+                self.pivot(front, block, &mut rest[0][BLOCK * BLOCK * first..])?;
+            }
+            let (pivots, rest) = rows.split_at_mut(last);
+            eliminate(self.arch, pivots, rest, first..last, k);
+        }
+        Ok(())
+    }
+
+    /// Factors block `block` of the front's diagonal, the last one of `row`.
+    fn pivot(&self, front: &Front, block: usize, row: &mut [f64]) -> Result<(), NotPositive> {
+        let columns = front.start + BLOCK * block..front.start + front.columns.min(BLOCK * block + BLOCK);
+        let unknowns = &self.tree.order[columns];
+        let floors: Vec<f64> = unknowns.iter().map(|&i| pivot_floor(self.graph.diagonal(i as usize))).collect();
+        let failed = |column: usize| NotPositive { unknown: unknowns[column] as usize };
+        self.arch.dispatch(Pivot { row, floors: &floors }).map_err(failed)
+    }
+}
+
+/// Subtracts what the block columns before `first` contribute to the next `count` ones of `rows`, the first of which is
+/// row block `first`.
+fn subtract_earlier(arch: Arch, rows: &mut [&mut [f64]], first: usize, count: usize) {
+    if first == 0 {
+        return;
+    }
+    let (earlier, mut now): (Vec<&[f64]>, Vec<&mut [f64]>) = rows
+        .iter_mut()
+        .map(|row| {
+            let (earlier, now) = row.split_at_mut(BLOCK * BLOCK * first);
+            (&*earlier, now)
+        })
+        .unzip();
+    product(arch, &earlier, &earlier[..count], &mut now, 0, false);
+}
+
+/// [`Product`] on several threads where that pays.
+fn product(arch: Arch, a: &[&[f64]], b: &[&[f64]], target: &mut [&mut [f64]], first: usize, overwrite: bool) {
+    let depth = b.first().map_or(0, |b| b.len());
+    if target.len() > 3 && BLOCK * depth * target.len() * b.len().min(first + target.len()) > FORK {
+        let middle = middle_row(first, target.len(), b.len());
+        let (above, below) = a.split_at(middle);
+        let (left, right) = target.split_at_mut(middle);
+        rayon::join(
+            || product(arch, above, b, left, first, overwrite),
+            || product(arch, below, b, right, first + middle, overwrite),
+        );
+    } else {
+        arch.dispatch(Product { a, b, target, first, overwrite });
+    }
+}
+
+/// Eliminates the block columns `blocks` in `rows`, on several threads where that pays.
+fn eliminate(arch: Arch, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks: Range<usize>, columns: usize) {
+    if rows.len() > 3 && BLOCK * rows.len() * (BLOCK * blocks.len()).pow(2) > FORK {
+        let (left, right) = rows.split_at_mut((rows.len() / 6 * 3).max(3));
+        rayon::join(
+            || eliminate(arch, pivots, left, blocks.clone(), columns),
+            || eliminate(arch, pivots, right, blocks.clone(), columns),
+        );
+    } else {
+        arch.dispatch(Eliminate { pivots, rows, first: blocks.start, last: blocks.end, columns });
+    }
+}
+
+/// The row blocks of a panel, those of its triangle first.
+fn row_blocks(mut panel: &mut [f64], columns: usize) -> Vec<&mut [f64]> {
+    let mut blocks = Vec::with_capacity(panel.len() / (BLOCK * columns).max(1) + 1);
+    for start in (0..columns).step_by(BLOCK) {
+        let (block, rest) = panel.split_at_mut(BLOCK * columns.min(start + BLOCK));
+        blocks.push(block);
+        panel = rest;
+    }
+    blocks.extend(panel.chunks_exact_mut((BLOCK * columns).max(1)));
+    blocks
+}
+
+/// The row blocks of an update.
+fn update_blocks(mut update: &mut [f64]) -> Vec<&mut [f64]> {
+    let mut blocks = Vec::new();
+    while !update.is_empty() {
+        let (block, rest) = update.split_at_mut(BLOCK * BLOCK * (blocks.len() + 1));
+        blocks.push(block);
+        update = rest;
+    }
+    blocks
+}

@@ -1,0 +1,124 @@
+//! The solver for surfaces: nested dissection by coordinates and a multifrontal factor.
+
+use glam::Vec3;
+use pulp::Arch;
+
+use crate::substitute::backward::backward;
+use crate::fronts::blocks::BLOCK;
+use crate::fronts::buffer::Buffer;
+use crate::ordering::dissection::dissect;
+use crate::fronts::factor::factor;
+use crate::substitute::forward::forward;
+use crate::ordering::graph::Graph;
+use crate::substitute::solution::{Part, RightHandSides, Solution};
+use crate::substitute::substitution::Columns;
+use crate::fronts::tree::Tree;
+use crate::{NotPositive, SymmetricMatrix};
+
+/// Right-hand sides solved together.
+const TOGETHER: usize = 64;
+
+/// A multifrontal factorisation.
+#[derive(Debug)]
+pub(crate) struct Multifrontal {
+    tree: Tree,
+    panels: Buffer,
+    arch: Arch,
+}
+
+impl Multifrontal {
+    /// Multiplications and additions that factoring `matrix` takes; `None` if it is no surface with these positions.
+    pub(crate) fn flops(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Option<f64> {
+        let graph = Graph::new(matrix);
+        let tree = Tree::new(&graph, dissect(&graph, positions)?);
+        Some(tree.fronts[tree.root()].subtree_flops)
+    }
+
+    /// Factors `matrix`; `None` if it is no surface with these positions.
+    pub(crate) fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Option<Self>, NotPositive> {
+        let graph = Graph::new(matrix);
+        let Some(dissection) = dissect(&graph, positions) else { return Ok(None) };
+        let tree = Tree::new(&graph, dissection);
+        let arch = Arch::new();
+        let panels = factor(&tree, &graph, arch)?;
+        Ok(Some(Self { tree, panels, arch }))
+    }
+
+    /// Solves for all columns, some at a time.
+    pub(crate) fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {
+        let part = |first: usize| {
+            let count = (rhs.columns - first).min(TOGETHER);
+            let width = count.next_multiple_of(BLOCK);
+            let mut values = Buffer::zeroed(rhs.size() * width);
+            let columns = Columns { rhs, first, count, width };
+            forward(&self.tree, &self.panels, self.arch, columns, &mut values);
+            backward(&self.tree, &self.panels, self.arch, width, &mut values);
+            Part { values, width, count }
+        };
+        let parts = (0..rhs.columns).step_by(TOGETHER).map(part).collect();
+        Solution { place: Some(&self.tree.place), parts, residual: 0.0 }
+    }
+
+    /// Number of stored entries of the factor.
+    pub(crate) fn stored(&self) -> usize {
+        self.panels.len()
+    }
+
+    /// Makes the factor wrong.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, factor: f64) {
+        self.panels.iter_mut().for_each(|value| *value *= factor);
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use crate::supernodal::Supernodal;
+    use super::*;
+
+    /// A chain of unknowns, each coupled to its next thirty.
+    pub(crate) fn chain(n: usize) -> (SymmetricMatrix, Vec<Vec3>) {
+        let mut matrix = SymmetricMatrix { column_starts: vec![0], ..Default::default() };
+        for j in 0..n {
+            for offset in 0..31.min(n - j) {
+                matrix.rows.push((j + offset) as u32);
+                matrix.values.push(if offset == 0 { 60.5 } else { -1.0 });
+            }
+            matrix.column_starts.push(matrix.rows.len());
+        }
+        (matrix, (0..n).map(|i| Vec3::new(i as f32, 0.0, 0.0)).collect())
+    }
+
+    /// Right-hand sides without a pattern.
+    pub(crate) fn sines(n: usize, columns: usize) -> RightHandSides {
+        RightHandSides::dense(n, columns, (0..n * columns).map(|i| (i as f64).sin()).collect())
+    }
+
+    /// Every instruction set this machine has.
+    fn instruction_sets() -> Vec<Arch> {
+        let mut sets = vec![Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+            sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+        }
+        sets
+    }
+
+    #[test]
+    fn solves_on_every_instruction_set() {
+        let (matrix, positions) = chain(1500);
+        let rhs = sines(1500, 29);
+        let oracle = Supernodal::factor(&matrix).unwrap();
+        let wanted = oracle.solve(&rhs);
+        for arch in instruction_sets() {
+            let mut solver = Multifrontal::factor(&matrix, &positions).unwrap().unwrap();
+            solver.arch = arch;
+            solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch).unwrap();
+            let x = solver.solve(&rhs);
+            let rows = (0..1500).flat_map(|i| x.row(i).zip(wanted.row(i)));
+            let worst = rows.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+            assert!(worst < 1e-9, "{arch:?}: {worst:e}");
+        }
+    }
+}

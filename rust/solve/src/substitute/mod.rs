@@ -1,0 +1,6 @@
+//! Forward and backward substitution through the tree of fronts, for many right-hand sides.
+
+pub(crate) mod backward;
+pub(crate) mod forward;
+pub(crate) mod solution;
+pub(crate) mod substitution;
