@@ -11,6 +11,7 @@ pub mod error;
 pub mod laplacian;
 pub mod mesh;
 pub mod progress;
+pub mod refine;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;
