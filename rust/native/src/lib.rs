@@ -5,6 +5,7 @@ mod desparsify;
 mod error;
 mod inpainting;
 mod job;
+mod ranges;
 mod sculpt;
 mod settings;
 mod skinning;
