@@ -15,6 +15,7 @@ from .. import declared, files, native
 from ..declared import SettingError
 from ..errors import Refused, internal
 from ..reporting import Report, SculptReport
+from ..scene import open_file
 from ..sculpt.params import SculptParams, options_from_json
 from ..sculpt.replay import read, replay
 from ..transfer import TransferParams, from_json, transfer_weights
@@ -150,7 +151,7 @@ def _work(options: argparse.Namespace, params: Params) -> Report | SculptReport:
 def _check_outputs(options: argparse.Namespace) -> None:
     """Before anything is done: no output may cost a file."""
     inputs = [path for name in options.inputs if (path := getattr(options, name))]
-    blends = [options.blend or Path(bpy.data.filepath)] if options.blend or bpy.data.filepath else []
+    blends = [options.blend] if options.blend else open_file.blend()
     if options.report:
         others = [*inputs, *blends, *([options.save] if options.save else [])]
         files.check_output(options.report, others=others, overwrite=options.overwrite, replaces=files.REPORT)

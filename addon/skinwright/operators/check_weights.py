@@ -11,7 +11,7 @@ from .. import files
 from ..check.params import CheckParams
 from ..check.weight_check import Fault, WeightCheck, check
 from ..registration import registration
-from ..scene import mesh
+from ..scene import mesh, open_file
 from ..settings.properties import properties, values
 from .base import SkinwrightOperator, selected_meshes
 
@@ -59,12 +59,12 @@ class SKINWRIGHT_OT_check_weights(_CheckSettings, SkinwrightOperator):
         params = CheckParams(**values(self, CheckParams))
         report = Path(bpy.path.abspath(self.filepath)) if self.filepath else None
         if report:
-            files.check_output(report, others=_open_file(), overwrite=self.overwrite, replaces=files.REPORT)
+            files.check_output(report, others=open_file.blend(), overwrite=self.overwrite, replaces=files.REPORT)
         targets = selected_meshes(context, without=settings.source) or selected_meshes(context)
         checks = [check(obj, settings.source, params) for obj in targets]
         if report:
             files.write_report(
-                report, [result.to_json() for result in checks], others=_open_file(), overwrite=self.overwrite
+                report, [result.to_json() for result in checks], others=open_file.blend(), overwrite=self.overwrite
             )
         for result in checks:
             mesh.select(context.scene.objects[result.target], self._chosen(result))
@@ -74,11 +74,6 @@ class SKINWRIGHT_OT_check_weights(_CheckSettings, SkinwrightOperator):
     def _chosen(self, result: WeightCheck):
         chosen = result.faulty.values() if self.select == "ALL" else [result.faulty[Fault[self.select]]]
         return np.logical_or.reduce(list(chosen))
-
-
-def _open_file() -> list[Path]:
-    """The .blend that is open, which no report replaces."""
-    return [Path(bpy.data.filepath)] if bpy.data.filepath else []
 
 
 register, unregister = registration(SKINWRIGHT_OT_check_weights)
