@@ -24,6 +24,7 @@ FEATURES = {
     "check": set(),
     "retarget": {"transfer"},
     "refine": set(),
+    "wardrobe": {"transfer"},
 }
 MAY_IMPORT = {
     "csr": set(),

@@ -18,6 +18,7 @@ from ..scene.error import SceneError
 from ..sculpt.replay import options_from_json, read, replay
 from ..sculpt.session import SculptOptions
 from ..transfer import TransferParams, from_json, to_json, transfer_weights
+from . import wardrobe as wardrobe_command
 
 DONE, FAILED, USAGE = 0, 1, 2
 Params = TransferParams | SculptOptions
@@ -34,6 +35,14 @@ def main(arguments: list[str]) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
+    _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
+    return _run(parser, arguments)
+
+
+def wardrobe(arguments: list[str]) -> int:
+    """The same without the word `wardrobe`, for the script."""
+    parser = argparse.ArgumentParser(prog="wardrobe.py", description="Transfer many garments to many bodies.")
+    _add_wardrobe(parser)
     return _run(parser, arguments)
 
 
@@ -69,6 +78,11 @@ def _add_sculpt(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(work=_sculpt, read=options_from_json, write=vars, default=SculptOptions())
 
 
+def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
+    wardrobe_command.add(parser)
+    parser.set_defaults(run=wardrobe_command.run)
+
+
 def _add_common(parser: argparse.ArgumentParser, settings: str, defaults: dict[str, Any]) -> None:
     listed = ", ".join(f"{name} {json.dumps(value)}" for name, value in defaults.items())
     parser.epilog = f"Settings and their defaults: {listed}."
@@ -81,9 +95,11 @@ def _add_common(parser: argparse.ArgumentParser, settings: str, defaults: dict[s
 def _run(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
     try:
         options = parser.parse_args(arguments)
-        params = _params(parser, options)
+        params = None if hasattr(options, "run") else _params(parser, options)
     except SystemExit as leave:  # argparse has said what is wrong; a host application must not be ended by it
         return leave.code if isinstance(leave.code, int) else USAGE
+    if params is None:
+        return options.run(options)
     try:
         report = _work(options, params)
         _write_report(options, params, report)
