@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension clean
+.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension test-windows test-arm64 clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -105,6 +105,15 @@ wheels: .venv/blender.stamp cargo
 extension: .venv/blender.stamp cargo
 	@ls dist/wheels/*.whl >/dev/null 2>&1 || $(MAKE) wheels PLATFORMS=linux-x64
 	.venv/bin/python blender_scripts/package_extension.py
+
+## make test-windows the Python suite in Windows' Blender under wine; says what is missing where it cannot
+test-windows: .venv/tests.stamp
+	.venv/bin/pip install ziglang==$(ZIG)
+	.venv/bin/python blender_scripts/test_windows.py
+
+## make test-arm64 the bits of the Linux wheel for ARM under qemu, against this machine's
+test-arm64: .venv/tests.stamp
+	blender_scripts/test_arm64.sh .venv/bin/python
 
 ## make clean      forget everything that was made but Cargo's target folder
 clean:
