@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension test-windows test-arm64 clean
+.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension test-windows test-arm64 docs clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -114,6 +114,11 @@ test-windows: .venv/tests.stamp
 ## make test-arm64 the bits of the Linux wheel for ARM under qemu, against this machine's
 test-arm64: .venv/tests.stamp
 	blender_scripts/test_arm64.sh .venv/bin/python
+
+## make docs       the manual as a site, in out/site; no network is used
+docs: .venv/blender.stamp
+	.venv/bin/pip install mkdocs-material==9.8.2
+	.venv/bin/mkdocs build --quiet
 
 ## make clean      forget everything that was made but Cargo's target folder
 clean:

@@ -76,24 +76,40 @@ def plain(node: ast.expr) -> str:
 
 
 def settings() -> str:
-    """The settings of each feature as the add-on declares them: name, default, range, what it does."""
+    """The settings of each feature as the add-on declares them: label, name, default, range, what it does."""
     lines = []
-    for path in sorted((ADDON / "settings").glob("*.py")):
-        rows = properties(path)
+    for path in sorted(ADDON.glob("*/params.py")):
+        rows = declarations(path)
         if rows:
-            lines += [f"## {path.stem.replace('_', ' ').title()}", "", "| setting | name in scripts | default | what it does |"]
-            lines += ["| --- | --- | --- | --- |", *rows, ""]
+            heading = f"## {path.parent.name.title()}"
+            lines += [heading, "", "| setting | name in scripts | default | range | what it does |"]
+            lines += ["| --- | --- | --- | --- | --- |", *rows, ""]
     return "\n".join(lines)
 
 
-def properties(path: Path) -> list[str]:
-    """A table row per Blender property that a file declares as a literal call."""
+def declarations(path: Path) -> list[str]:
+    """A table row per setting that a file declares."""
     rows = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.AnnAssign) and isinstance(node.annotation, ast.Call):
-            given = {keyword.arg: keyword.value for keyword in node.annotation.keywords}
-            if "description" in given and "name" in given:
-                default = ast.unparse(given["default"]) if "default" in given else ""
-                row = (plain(given["name"]), f"`{node.target.id}`", default, plain(given["description"]))
-                rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |")
+        call = node.value if isinstance(node, ast.AnnAssign) else None
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "setting" and len(call.args) > 2:
+            default, label, sentence = call.args[:3]
+            given = {keyword.arg: keyword.value for keyword in call.keywords}
+            cells = [plain(label), f"`{node.target.id}`", shown(default), allowed(given), plain(sentence)]
+            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return rows
+
+
+def shown(default: ast.expr) -> str:
+    """A default as a person reads it."""
+    text = ast.unparse(default)
+    return "" if text == "MISSING" else f"{text[13:-1]}°" if text.startswith("math.radians(") else text.strip("'")
+
+
+def allowed(given: dict[str, ast.expr]) -> str:
+    """The choices or the range of a setting."""
+    choices = given.get("choices")
+    if isinstance(choices, ast.Dict):
+        return ", ".join(f"`{ast.literal_eval(key)}`" for key in choices.keys if isinstance(key, ast.Constant))
+    ends = [ast.unparse(given[name]) if name in given else "" for name in ("least", "most")]
+    return f"{ends[0] or '0'} to {ends[1]}" if ends[1] else ""

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     name = "report.json" if count == 1 and not options.job else f"report-{index}-of-{count}.json"
     merged = results.merge(outcomes)
     if not options.job:
-        results.write_whole(options.out / name, (json.dumps(merged, indent=2) + "\n").encode())
+        results.write(options.out, name, (json.dumps(merged, indent=2) + "\n").encode())
     return 1 if merged["failed"] else 0
 
 

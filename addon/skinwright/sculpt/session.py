@@ -6,7 +6,6 @@ name each time, as Blender's undo replaces it.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import bpy
 import numpy as np
@@ -18,27 +17,10 @@ from ..desparsify import DesparsifyParams, desparsify
 from ..reporting import SculptReport
 from ..scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups
 from ..scene.error import SceneError
+from .params import SculptParams as SculptOptions
 
 # Every keyframe costs a pass over the mesh when a session begins.
 MOST_GUARD_FRAMES = 24
-
-
-@dataclass(frozen=True)
-class SculptOptions:
-    """How strokes become weights; `kappa` and `passes` as in the native stub.
-
-    `candidates` are given to every vertex at the start (0: only those it has). `guard` poses hold with `guard_alpha`;
-    rest always holds. `residual` is what becomes of what weights cannot reach.
-    """
-
-    kappa: float = 0.01
-    passes: int = 3
-    candidates: int = 4
-    method: Literal["surface", "hop"] = "surface"
-    guard: Literal["NONE", "ACTION", "RANGE"] = "NONE"
-    guard_alpha: float = 0.2
-    residual: Literal["DISCARD", "SHAPE_KEY"] = "DISCARD"
-    threads: int = 0
 
 
 @dataclass(frozen=True)

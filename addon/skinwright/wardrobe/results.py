@@ -2,12 +2,11 @@
 
 import hashlib
 import json
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..files import REPORT, write_whole
 from .manifest import Job
 
 
@@ -35,25 +34,16 @@ def kept(folder: Path, job: Job, inputs: str) -> dict[str, Any] | None:
     return record if whole and record.get("inputs") == inputs else None
 
 
-def write_whole(path: Path, content: bytes) -> str:
+def write(folder: Path, name: str, content: bytes) -> str:
     """Write a file that is whole or absent, whenever the process ends; returns its SHA-256."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(folder / name, content)
     return hashlib.sha256(content).hexdigest()
 
 
 def write_record(folder: Path, job: Job, record: dict[str, Any]) -> None:
     """The last file of a job: what is not recorded is done again."""
-    write_whole(folder / f"{job.name}.json", (json.dumps(record, indent=2) + "\n").encode())
+    write(folder, f"{job.name}.json", (json.dumps(record, indent=2) + "\n").encode())
 
 
 def merge(outcomes: list[Outcome]) -> dict[str, Any]:
@@ -61,4 +51,4 @@ def merge(outcomes: list[Outcome]) -> dict[str, Any]:
     rank = {"failed": 0, "done": 1, "kept": 1}
     ordered = sorted(outcomes, key=lambda o: (rank[o.status], -o.record.get("unmatched_share", 0.0), o.job))
     counts = {status: sum(o.status == status for o in outcomes) for status in ("done", "kept", "failed")}
-    return {"jobs": len(outcomes), **counts, "outcomes": [outcome.to_json() for outcome in ordered]}
+    return {"format": REPORT, "jobs": len(outcomes), **counts, "outcomes": [outcome.to_json() for outcome in ordered]}

@@ -1,5 +1,6 @@
 """One job of a wardrobe inside Blender: load both files, transfer, leave the weights and a record."""
 
+import hashlib
 import io
 from pathlib import Path
 
@@ -7,12 +8,13 @@ import bpy
 import numpy as np
 
 from .. import native
+from ..errors import Refused
 from ..reporting import Report
-from ..scene import armature, files, vertex_groups
+from ..scene import armature, loading, vertex_groups
 from ..scene.error import SceneError
 from ..transfer import from_json, transfer_weights
 from .manifest import Job, ManifestError
-from .results import Outcome, kept, write_record, write_whole
+from .results import Outcome, kept, write, write_record
 
 
 def run(job: Job, folder: Path, *, save_blend: bool = False) -> Outcome:
@@ -23,7 +25,7 @@ def run(job: Job, folder: Path, *, save_blend: bool = False) -> Outcome:
         if record:
             return Outcome(job.name, "kept", record)
         record = _work(job, folder, save_blend) | {"inputs": inputs}
-    except (ManifestError, SceneError, native.NativeError, ValueError, OSError) as error:
+    except (ManifestError, Refused, OSError) as error:
         return Outcome(job.name, "failed", {"error": str(error)})
     write_record(folder, job, record)
     return Outcome(job.name, "done", record)
@@ -31,16 +33,16 @@ def run(job: Job, folder: Path, *, save_blend: bool = False) -> Outcome:
 
 def _work(job: Job, folder: Path, save_blend: bool) -> dict:
     params = from_json(job.settings)
-    files.empty()
-    source = _body(job, files.load(job.body))
-    targets = _garments(job, files.load(job.garment))
+    loading.empty()
+    source = _body(job, loading.load(job.body))
+    targets = _garments(job, loading.load(job.garment))
     report = transfer_weights(bpy.context, source, targets, params)
-    written = {f"{job.name}.npz": write_whole(folder / f"{job.name}.npz", _weights(targets))}
+    written = {f"{job.name}.npz": write(folder, f"{job.name}.npz", _weights(targets))}
     if save_blend:
         # Blender writes its file whole or not at all by itself.
         path = folder / f"{job.name}.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), copy=True, check_existing=False)
-        written[path.name] = write_whole(path, path.read_bytes())
+        written[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
     return {"files": written, "sentence": report.sentence(), "warnings": report.all_warnings()} | _scores(report)
 
 
