@@ -8,6 +8,7 @@
 pub mod adjacency;
 pub mod desparsify;
 pub mod error;
+pub mod inside;
 pub mod laplacian;
 pub mod mesh;
 pub mod progress;
