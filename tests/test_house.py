@@ -25,6 +25,7 @@ FEATURES = {
     "check": set(),
     "retarget": {"transfer"},
     "refine": set(),
+    "wardrobe": {"transfer"},
 }
 MAY_IMPORT = {
     "csr": set(),
@@ -123,6 +124,8 @@ def test_no_integer_of_the_platforms_size(module):
 def test_versions_are_equal():
     version = toml("Cargo.toml")["workspace"]["package"]["version"]
     assert toml("addon/skinwright/blender_manifest.toml")["version"] == version
+    named = toml("Cargo.toml")["workspace"]["dependencies"]
+    assert {named[f"skinwright-{crate}"]["version"] for crate in ("core", "solve")} == {version}
     for crate in ("core", "native", "solve"):
         assert toml(f"rust/{crate}/Cargo.toml")["package"]["version"] == {"workspace": True}
     assert toml("pyproject.toml")["project"].get("version", version) == version

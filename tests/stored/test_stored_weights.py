@@ -249,3 +249,43 @@ def test_states_of_a_large_mesh_and_their_size(addon, keeping, digest):
     before = keeping.size(coat)
     bpy.ops.skinwright.store_weights(state_name="Again")  # the same bytes
     assert keeping.size(coat) < before + 1000
+
+
+class TestCommand:
+    """`skinwright weights ...`, in this process."""
+
+    @pytest.fixture
+    def weights(self, addon):
+        return lambda *arguments: addon.headless.command_line.weights([str(a) for a in arguments])
+
+    def test_out_and_in_again(self, weights, body, digest, tmp_path, capsys):
+        before, path = digest(body), tmp_path / "body.json"
+        assert weights("store", "--object", "Body", "--name", "Mine") == 0
+        assert weights("export", "--object", "Body", "--file", path) == 0
+        body.vertex_groups.clear()
+        assert weights("compare", "--object", "Body", "--name", "Mine") == 0
+        assert "256 of 256 vertices differ" in capsys.readouterr().out
+        assert weights("import", "--object", "Body", "--file", path, "--save", tmp_path / "out.blend") == 0
+        assert digest(body) == before
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+        assert digest(bpy.data.objects["Body"]) == before
+        assert weights("list", "--object", "Body") == 0
+        assert "Mine: 256 vertices" in capsys.readouterr().out
+        assert weights("forget", tmp_path / "out.blend", "--object", "Body") == 0
+
+    def test_refusals(self, weights, body, tmp_path, capsys):
+        (tmp_path / "mine.npz").write_bytes(b"mine")
+        for arguments, sentence in [
+            (("restore", "--object", "Body"), "no stored weights"),
+            (("export", "--object", "Body"), "needs --file"),
+            (("export", "--object", "Body", "--file", tmp_path / "mine.npz"), "exists already"),
+            (("import", "--object", "Body", "--file", tmp_path / "mine.npz"), "cannot be read"),
+            (("import", "--object", "Body", "--file", tmp_path / "gone.npz"), "No such file"),
+            (("list", "--object", "Rig"), "Rig is not a mesh"),
+            (("list", "--object", "Nobody"), "there is no object Nobody"),
+            (("list", tmp_path / "gone.blend", "--object", "Body"), "there is no file"),
+        ]:
+            assert weights(*arguments) == 1, arguments
+            error = capsys.readouterr().err
+            assert sentence in error and "Traceback" not in error
+        assert (tmp_path / "mine.npz").read_bytes() == b"mine"

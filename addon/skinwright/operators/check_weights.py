@@ -11,7 +11,7 @@ from .. import files
 from ..check.params import CheckParams
 from ..check.weight_check import Fault, WeightCheck, check
 from ..registration import registration
-from ..scene import mesh, open_file
+from ..scene import blend_file, mesh
 from ..settings.properties import properties, values
 from .base import SkinwrightOperator, selected_meshes
 
@@ -59,12 +59,12 @@ class SKINWRIGHT_OT_check_weights(_CheckSettings, SkinwrightOperator):
         params = CheckParams(**values(self, CheckParams))
         report = Path(bpy.path.abspath(self.filepath)) if self.filepath else None
         if report:
-            files.check_output(report, others=open_file.blend(), overwrite=self.overwrite, replaces=files.REPORT)
+            files.check_output(report, others=blend_file.opened(), overwrite=self.overwrite, replaces=files.REPORT)
         targets = selected_meshes(context, without=settings.source) or selected_meshes(context)
         checks = [check(obj, settings.source, params) for obj in targets]
         if report:
             files.write_report(
-                report, [result.to_json() for result in checks], others=open_file.blend(), overwrite=self.overwrite
+                report, [result.to_json() for result in checks], others=blend_file.opened(), overwrite=self.overwrite
             )
         for result in checks:
             mesh.select(context.scene.objects[result.target], self._chosen(result))

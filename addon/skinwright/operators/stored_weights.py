@@ -9,7 +9,7 @@ from bpy.types import Context, Event, Object, Operator
 
 from .. import files, preferences
 from ..registration import registration
-from ..scene import mesh, open_file
+from ..scene import blend_file, mesh
 from ..stored import comparing, exchange, keeping, restoring
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
 
@@ -192,7 +192,7 @@ class SKINWRIGHT_OT_export_weights(_File, _OnMeshes):
         """The active one."""
         obj = context.active_object if context.active_object in objects else objects[0]
         path = self.path()
-        exchange.write(path, keeping.take(obj), overwrite=self.overwrite, others=open_file.blend())
+        exchange.write(path, keeping.take(obj), overwrite=self.overwrite, others=blend_file.opened())
         self.report({"INFO"}, f"{obj.name}: weights written to {path.name}")
         return {"FINISHED"}
 
