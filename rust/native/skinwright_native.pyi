@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
 
 def version() -> str: ...
+def set_memory_budget(bytes: int | None) -> None:
+    """Bytes that one piece of work may take, None for whatever the machine has; what would take more is refused with a
+    MemoryError that states the estimate."""
+
 
 class SkinwrightError(ValueError): ...
 class NothingMatched(SkinwrightError): ...

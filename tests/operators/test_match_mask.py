@@ -226,7 +226,7 @@ class TestRefusedMeansUnchanged:
     def test_from_match_with_a_source_without_faces(self, scene, coat):
         scene.skinwright.transfer.source.data.clear_geometry()
         before = [group.name for group in coat.vertex_groups], coat.skinwright.mask_group
-        with pytest.raises(RuntimeError, match="has no faces"):
+        with pytest.raises(RuntimeError, match="has no (faces|vertex groups)"):
             bpy.ops.skinwright.edit_match_mask(action="FROM_MATCH")
         assert ([group.name for group in coat.vertex_groups], coat.skinwright.mask_group) == before
 

@@ -7,6 +7,7 @@ use skinwright_core::desparsify::{self as core, Method, Skeleton};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
@@ -37,6 +38,7 @@ pub fn desparsify(
         return Err(InvalidParameter::new_err(needs));
     }
     let locked = locked.map(|l| entries(&l)).unwrap_or_default();
+    memory::expect("Desparsification", memory::of_desparsify(weights.vertex_count(), n))?;
     let result = enter(py, threads, || {
         let mesh = match (&positions, &triangles) {
             (Some(positions), Some(triangles)) if method == Method::Surface => {
