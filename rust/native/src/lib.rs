@@ -6,6 +6,7 @@ mod error;
 mod fill;
 mod inpainting;
 mod job;
+mod refine;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -33,7 +34,9 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
-    use crate::skinning::linear_blend;
+    use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
+    use crate::skinning::{dual_quaternion_blend, linear_blend};
     #[pymodule_export]
     use crate::source::{Source, transfer_weights};
     #[pymodule_export]
