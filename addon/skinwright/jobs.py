@@ -28,7 +28,7 @@ class Runner:
         self._job: native.Job | None = None
         self.done = False
         self.result: Any = None
-        self._send(None)
+        self._advance(lambda: next(steps))
 
     @property
     def progress(self) -> float:
@@ -57,14 +57,15 @@ class Runner:
     def _answer(self, job: native.Job) -> None:
         try:
             answer = job.result()
-        except native.NativeError:
-            self._steps.close()
-            raise
-        self._send(answer)
+        except native.NativeError as error:
+            sentence = error  # the steps may go on without it
+            self._advance(lambda: self._steps.throw(sentence))
+            return
+        self._advance(lambda: self._steps.send(answer))
 
-    def _send(self, answer: Any) -> None:
+    def _advance(self, step: Callable[[], native.Job]) -> None:
         try:
-            self._job = self._steps.send(answer)
+            self._job = step()
         except StopIteration as end:
             self._job, self.done, self.result = None, True, end.value
 

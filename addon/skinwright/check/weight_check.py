@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import csr
-from ..scene import armature, depth, mesh, poses, vertex_groups
+from ..scene import armature, depth, mesh, poses, shapes, vertex_groups
 from ..scene.error import SceneError
 from .params import CheckParams
 
@@ -93,7 +93,7 @@ class _Garment:
         self.target, self.body, self.rig, self.limits = target, body, rig, limits
         self.edges = mesh.edges(target)
         with poses.at_rest(rig):
-            self.rest = mesh.read(target, evaluated=True)
+            self.rest = shapes.read_target(target, "CURRENT").geometry
             self.lengths = _lengths(self.rest.positions, self.edges)
             n = len(self.rest.positions)
             self.sampled = np.unique(np.linspace(0, n - 1, min(n, _MOST_POINTS)).astype(int))
@@ -103,7 +103,7 @@ class _Garment:
         """(P,) of the sampled points, 0 without a body."""
         if self.body is None:
             return np.zeros(len(self.sampled), np.float32)
-        return depth.inside(shape.positions[self.sampled], mesh.read(self.body, evaluated=True))
+        return depth.inside(shape.positions[self.sampled], shapes.read_target(self.body, "CURRENT").geometry)
 
     def pose_names(self, bones: list[str]) -> Iterator[str]:
         """Puts the armature into pose after pose."""
@@ -113,7 +113,7 @@ class _Garment:
 
     def faults_now(self) -> dict[Fault, NDArray[np.bool_]]:
         """(V,) what the pose that is shown now does."""
-        shape = mesh.read(self.target, evaluated=True)
+        shape = shapes.read_target(self.target, "CURRENT").geometry
         lengths, diagonal = _lengths(shape.positions, self.edges), float(np.linalg.norm(self.rest.size))
         ratio = np.where(
             lengths - self.lengths > _LEAST_LENGTHENING * diagonal, lengths / np.maximum(self.lengths, 1e-30), 1.0
