@@ -140,6 +140,17 @@ def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Seq
     return np.array(object_from_armature) @ pose @ np.linalg.inv(rest) @ np.array(armature_from_object)
 
 
+def world_pose(rigs: Sequence[bpy.types.Object], bones: Sequence[str]) -> NDArray[np.float64]:
+    """(B, 4, 4) where each bone takes a point of the world that it carries, as the armatures are posed now."""
+    found = np.tile(np.eye(4), (len(bones), 1, 1))
+    for rig in reversed(rigs):
+        known = [column for column, name in enumerate(bones) if name in rig.data.bones]
+        names, world = [bones[column] for column in known], np.array(rig.matrix_world)
+        pose, rest = _matrices(rig.pose.bones, "matrix", names), _matrices(rig.data.bones, "matrix_local", names)
+        found[known] = world @ pose @ np.linalg.inv(rest) @ np.linalg.inv(world)
+    return found
+
+
 def _matrices(all_bones: bpy.types.bpy_prop_collection, name: str, bones: Sequence[str]) -> NDArray[np.float64]:
     """(B, 4, 4) a matrix of each of these bones: all in one call, as one by one they take five times as long."""
     columns = np.empty((len(all_bones), 4, 4), np.float32)

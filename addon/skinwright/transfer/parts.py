@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from .. import csr
 from ..csr import Rows
 from ..scene.mesh import Geometry
+from ..scene.places import coincident
 
 # Of the diagonal; single precision leaves that much where objects have places of their own.
 _TOLERANCE = 1e-6
-_PRIMES = np.array([73856093, 19349663, 83492791], np.int64)
 # Two or three points touch by chance.
 _FEWEST = 3
 
@@ -65,26 +65,6 @@ def border(geometry: Geometry) -> NDArray[np.bool_]:
     marked = np.zeros(int(same.max(initial=0)) + 1, bool)
     marked[single // len(same)] = marked[single % len(same)] = True
     return marked[same]
-
-
-def coincident(a: NDArray[np.float32], b: NDArray[np.float32], tolerance: float) -> NDArray[np.int64]:
-    """For each point of `b` (n, 3) a point of `a` (m, 3) within the tolerance, -1 where there is none."""
-    cell = 4 * max(tolerance, 1e-30)
-    keys = _keys(a, cell, 0.0)
-    order = np.argsort(keys, kind="stable")
-    found = np.full(len(b), -1, np.int64)
-    for corner in np.ndindex(2, 2, 2):
-        open_ = np.flatnonzero(found < 0)
-        wanted = _keys(b[open_], cell, (2 * np.array(corner) - 1) * tolerance)
-        place = np.minimum(np.searchsorted(keys[order], wanted), len(a) - 1)
-        near = order[place]
-        close = (keys[near] == wanted) & (np.linalg.norm(a[near] - b[open_], axis=1) <= tolerance)
-        found[open_[close]] = near[close]
-    return found
-
-
-def _keys(points: NDArray[np.float32], cell: float, shift: float | NDArray[np.float64]) -> NDArray[np.int64]:
-    return (np.floor((points.astype(np.float64) + shift) / cell).astype(np.int64) * _PRIMES).sum(axis=1, dtype=np.int64)
 
 
 def united(geometries: Sequence[Geometry]) -> Geometry:
