@@ -6,7 +6,7 @@ import bpy
 
 
 def registration(*classes: type) -> tuple[Callable[[], None], Callable[[], None]]:
-    """The two functions for these classes, parents first: `register, unregister = registration(...)`."""
+    """What a module calls `register` and `unregister`, for these classes; parents first."""
 
     def register() -> None:
         for cls in classes:

@@ -179,15 +179,18 @@ class SculptSolver:
 
     def undo(self) -> NDArray[np.uint32] | None:
         """Takes the last stroke back; the vertices it had touched."""
-        return self._solver.undo()
+        with _naming(self.name):
+            return self._solver.undo()
 
     def redo(self) -> NDArray[np.uint32] | None:
         """Does it again; likewise."""
-        return self._solver.redo()
+        with _naming(self.name):
+            return self._solver.redo()
 
     def rows(self, vertices: NDArray | None = None) -> Rows:
         """The present rows of these vertices, or of all."""
-        return _rows(self._solver.weights(vertices))
+        with _naming(self.name):
+            return _rows(self._solver.weights(vertices))
 
     @property
     def stroke_count(self) -> int:
@@ -201,7 +204,8 @@ class SculptSolver:
 
     def rest_residuals(self, pose: int) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """The vertices (n,) sculpted in a pose, and the offsets (n, 3) at rest that weights cannot stand in for."""
-        return self._solver.rest_residuals(pose=pose)
+        with _naming(self.name):
+            return self._solver.rest_residuals(pose=pose)
 
 
 def _rows(weights: Any) -> Rows:
@@ -210,7 +214,12 @@ def _rows(weights: Any) -> Rows:
 
 @contextmanager
 def _naming(name: str) -> Iterator[None]:
+    """What the module raises, a panic of Rust included, as one class whose sentence names the object."""
     try:
         yield
-    except _module.SkinwrightError as error:
+    except (_module.SkinwrightError, OverflowError, RuntimeError) as error:
         raise NativeError(f"{name}: {error}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise NativeError(f"{name}: internal error in Skinwright, please report it: {error}") from error

@@ -6,6 +6,7 @@ mod error;
 mod fill;
 mod inpainting;
 mod job;
+mod ranges;
 mod sculpt;
 mod settings;
 mod skinning;
