@@ -6,7 +6,7 @@ import bpy
 
 
 def registration(*classes: type) -> tuple[Callable[[], None], Callable[[], None]]:
-    """Return the functions that register these classes, parents first, and unregister them."""
+    """What a module calls `register` and `unregister`, for these classes; parents first."""
 
     def register() -> None:
         for cls in classes:

@@ -91,7 +91,9 @@ pub enum Error {
         vertex: usize,
     },
     /// A mesh without an inside for tetrahedra.
-    #[error("the mesh encloses nothing: no tetrahedron lies inside of it; it needs thickness, and normals that point outwards")]
+    #[error(
+        "the mesh encloses nothing: no tetrahedron lies inside of it; it needs thickness, and normals that point outwards"
+    )]
     NothingInside,
     /// A mesh beyond what an operation can take.
     #[error("the mesh has {found} vertices, but at most {most} can be refined; bake a lighter version")]

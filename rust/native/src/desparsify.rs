@@ -7,6 +7,7 @@ use skinwright_core::desparsify::{self as core, Method, Skeleton};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
 
@@ -19,13 +20,13 @@ pub fn desparsify(
     py: Python<'_>,
     weights: &Weights,
     bone_parents: Vector<'_, i32>,
-    n: usize,
+    #[pyo3(from_py_with = ranges::members)] n: usize,
     method: &str,
     positions: Option<Matrix<'_, f32>>,
     triangles: Option<Matrix<'_, u32>>,
     bone_segments: Option<Stack<'_, f32>>,
     locked: Option<Vector<'_, bool>>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Weights> {
     let (method, weights, parents) = (method_of(method)?, weights.to_core(py)?, entries(&bone_parents));
     let positions = positions.map(|p| triples(&p, "positions")).transpose()?;

@@ -11,6 +11,7 @@ use skinwright_core::transfer::{self as core, MatchMethod};
 use crate::arrays::{Matrix, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::source::Source;
 use crate::transfer::{Closest, Transfer};
@@ -54,7 +55,7 @@ impl Inpainting {
         source: &Source,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let positions = triples(&target_positions, "target_positions")?;
         let triangles = triples(&target_triangles, "target_triangles")?;
@@ -119,7 +120,7 @@ impl Inpainting {
         let (settings, mask) = keywords(settings)?;
         let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Ok(Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer))))
+        Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer)))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other

@@ -6,6 +6,7 @@ mod error;
 mod fill;
 mod inpainting;
 mod job;
+mod ranges;
 mod refine;
 mod sculpt;
 mod settings;
@@ -32,9 +33,9 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]
-    use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
-    #[pymodule_export]
     use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
+    use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
     use crate::skinning::{dual_quaternion_blend, linear_blend};
     #[pymodule_export]

@@ -8,6 +8,7 @@ use skinwright_core::transfer as core;
 
 use crate::arrays::{Matrix, triples};
 use crate::error::enter;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::transfer::{Closest, Transfer};
 use crate::weights::Weights;
@@ -29,7 +30,7 @@ impl Source {
         positions: Matrix<'_, f32>,
         triangles: Matrix<'_, u32>,
         weights: &Weights,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
         let weights = weights.to_core(py)?;
@@ -44,7 +45,7 @@ impl Source {
         &self,
         py: Python<'py>,
         positions: Matrix<'_, f32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<ClosestPoints<'py>> {
         let positions = triples(&positions, "positions")?;
         let (triangles, barycentric, distances) = enter(py, threads, || {
@@ -64,7 +65,7 @@ impl Source {
         py: Python<'_>,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
@@ -93,7 +94,7 @@ pub fn transfer_weights(
     source_weights: &Weights,
     target_positions: Matrix<'_, f32>,
     target_triangles: Matrix<'_, u32>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Transfer> {
     let source = Source::new(py, source_positions, source_triangles, source_weights, threads)?;

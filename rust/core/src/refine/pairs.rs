@@ -7,12 +7,12 @@ use rayon::prelude::*;
 ///
 /// A sweep along the longest axis of the bounding box, cut into slabs that are searched in parallel.
 pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let boxes: Vec<(Vec3, Vec3)> = triangles.iter().map(|t| bounds(t.map(|i| Vec3::from(positions[i as usize])))).collect();
+    let boxes: Vec<(Vec3, Vec3)> =
+        triangles.iter().map(|t| bounds(t.map(|i| Vec3::from(positions[i as usize])))).collect();
     let axis = longest_axis(&boxes);
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-    order.par_sort_unstable_by(|&a, &b| {
-        boxes[a as usize].0[axis].total_cmp(&boxes[b as usize].0[axis]).then(a.cmp(&b))
-    });
+    order
+        .par_sort_unstable_by(|&a, &b| boxes[a as usize].0[axis].total_cmp(&boxes[b as usize].0[axis]).then(a.cmp(&b)));
     let of_one = |k: usize| {
         let i = order[k];
         let (low, high) = boxes[i as usize];

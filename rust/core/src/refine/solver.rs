@@ -274,14 +274,7 @@ impl Frame<'_> {
         }
     }
 
-    fn joint_report(
-        &self,
-        k: usize,
-        path: &Path<'_>,
-        pose: &[DAffine3],
-        axis: &Axis,
-        before: &[Vec3],
-    ) -> JointReport {
+    fn joint_report(&self, k: usize, path: &Path<'_>, pose: &[DAffine3], axis: &Axis, before: &[Vec3]) -> JointReport {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
         let balloon = Balloon::new(&self.local, members, &[]);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
