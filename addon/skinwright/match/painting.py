@@ -9,7 +9,7 @@ import time
 import bpy
 
 from .. import jobs, native
-from ..scene import brush, changes, mask, vertex_groups
+from ..scene import brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
 from .session import MatchSession
@@ -34,7 +34,7 @@ class MaskPainting:
     def __init__(self, context: bpy.types.Context, target: bpy.types.Object, params: TransferParams) -> None:
         """Show the match and go to Weight Paint mode on the mask. Raises SceneError or native.NativeError."""
         settings = context.scene.skinwright
-        self.before = vertex_groups.snapshot(target)
+        self.before = weight_state.capture(target)
         self.mask_group, self.mode, self.overlay = target.skinwright.mask_group, target.mode, settings.overlay.kind
         try:
             group = mask.ensure(target)
@@ -136,5 +136,5 @@ class MaskPainting:
             bpy.ops.object.mode_set(mode=self.mode)
 
     def _restore(self, target: bpy.types.Object) -> None:
-        vertex_groups.restore(target, self.before)
+        weight_state.apply(target, self.before)
         target.skinwright.mask_group = self.mask_group
