@@ -47,11 +47,20 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     `bones` index into `names` and ascend in each row; a name the object lacks has no entries.
     Raises SceneError for a weight that is not a number.
     """
-    n = len(obj.data.vertices)
-    indices = [obj.vertex_groups.find(_stored(name)) for name in names]
-    if all(index < 0 for index in indices):
+    return _read(obj, obj.data, {group.name: group.index for group in obj.vertex_groups}, names)
+
+
+def read_evaluated(obj: bpy.types.Object, mesh: bpy.types.Mesh, names: Sequence[str]) -> Rows:
+    """The same of a mesh that the modifiers of an evaluated object leave."""
+    return _read(obj, mesh, {group.name: group.index for group in obj.vertex_groups}, names)
+
+
+def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], names: Sequence[str]) -> Rows:
+    n = len(mesh.vertices)
+    indices = [index.get(_stored(name), -1) for name in names]
+    if all(i < 0 for i in indices):
         return csr.empty(n)
-    held = _memberships(obj.data, np.arange(n, dtype=np.int64))
+    held = _memberships(mesh, np.arange(n, dtype=np.int64))
     column = _lookup(indices, held.group)
     keep = column >= 0
     vertex, column, values = held.row[keep], column[keep], held.values[keep]
