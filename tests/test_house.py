@@ -38,7 +38,7 @@ MAY_IMPORT = {
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
     "settings": {"declared", "errors"} | set(FEATURES),
     "preferences": {"declared", "native", "registration", "settings"},
-    "overlay": FLOOR | {"match", "transfer"},
+    "overlay": FLOOR | {"check", "match", "transfer"},
     "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
     "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},
     "headless": FLOOR | set(FEATURES),

@@ -15,6 +15,7 @@ class SKINWRIGHT_PG_overlay(PropertyGroup):
             ("MATCH", "Match", "Which vertices match, which are inpainted, which the mask decides"),
             ("INFLUENCES", "Influences", "How many bones each vertex of the active mesh follows"),
             ("STRETCH", "Stretch", "Where the pose stretches or presses the edges of the active mesh"),
+            ("FAULTS", "Faults", "What Check Weights last found on the active mesh"),
         ],
     )
     opacity: FloatProperty(

@@ -11,6 +11,7 @@ pub mod error;
 pub mod fill;
 pub mod laplacian;
 pub mod mesh;
+pub mod penetration;
 pub mod progress;
 pub mod sculpt;
 pub mod skinning;

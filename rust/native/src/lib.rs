@@ -6,6 +6,7 @@ mod error;
 mod fill;
 mod inpainting;
 mod job;
+mod penetration;
 mod ranges;
 mod sculpt;
 mod settings;
@@ -31,6 +32,8 @@ mod skinwright_native {
     use crate::inpainting::Inpainting;
     #[pymodule_export]
     use crate::job::Job;
+    #[pymodule_export]
+    use crate::penetration::penetration;
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
