@@ -6,7 +6,7 @@ import bpy
 
 
 def registration(*classes: type) -> tuple[Callable[[], None], Callable[[], None]]:
-    """What a module calls `register` and `unregister`, for these classes; parents first."""
+    """Return the functions that register these classes, parents first, and unregister them."""
 
     def register() -> None:
         for cls in classes:

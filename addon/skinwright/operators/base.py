@@ -1,11 +1,12 @@
 """What every operator has in common: refusal in a sentence, targets, and one net under all of its work."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bpy.types import Context, Object, Operator
 
 from .. import native
 from ..errors import Refused, internal
+from ..stored import keeping
 
 # The modes of operators that work on meshes as they are selected.
 MESH_MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
@@ -43,6 +44,10 @@ class SkinwrightOperator(Operator):
         except Exception as error:
             self.report({"ERROR"}, f"{self.bl_label}: {internal(error)}")
         return {"CANCELLED"}
+
+    def keep_before(self, objects: Sequence[Object]) -> None:
+        """Keep the weights of `objects` in the file, as they are before this operator writes."""
+        keeping.keep_before(objects, self.bl_label)
 
     def tell(self, sentence: str, warnings: list[str]) -> set[str]:
         """The result, and then what is worth a look, as the status bar shows the last report."""

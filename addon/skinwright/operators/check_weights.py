@@ -12,7 +12,7 @@ from ..check.params import CheckParams
 from ..check.weight_check import Fault, WeightCheck, steps
 from ..jobs import Jobs
 from ..registration import registration
-from ..scene import mesh
+from ..scene import blend_file, mesh
 from ..settings.properties import properties, values
 from .base import SkinwrightOperator, selected_meshes
 from .modal.long_work import LongWork
@@ -70,7 +70,7 @@ class SKINWRIGHT_OT_check_weights(_CheckSettings, LongWork, SkinwrightOperator):
         shown.keep(result)
         if self.filepath:
             content = [each.to_json() for each in result]
-            files.write_report(self._report_path(), content, others=_open_file(), overwrite=self.overwrite)
+            files.write_report(self._report_path(), content, others=blend_file.opened(), overwrite=self.overwrite)
         for each in result:
             if self.select != "NONE":
                 chosen = each.any_fault() if self.select == "ALL" else each.faulty[Fault[self.select]]
@@ -86,7 +86,7 @@ class SKINWRIGHT_OT_check_weights(_CheckSettings, LongWork, SkinwrightOperator):
         params = CheckParams(**values(self, CheckParams))
         if self.filepath:
             files.check_output(
-                self._report_path(), others=_open_file(), overwrite=self.overwrite, replaces=files.REPORT
+                self._report_path(), others=blend_file.opened(), overwrite=self.overwrite, replaces=files.REPORT
             )
         targets = selected_meshes(context, without=settings.source) or selected_meshes(context)
         return _one_by_one([(target, settings.source, params) for target in targets])
@@ -119,11 +119,6 @@ class SKINWRIGHT_OT_show_worst_pose(SkinwrightOperator):
     def work(self, context: Context) -> set[str]:
         """Pose it, and name the pose."""
         return self.tell(f"{context.object.name}: {shown.take_worst_pose(context.object)}", [])
-
-
-def _open_file() -> list[Path]:
-    """The .blend that is open, which no report replaces."""
-    return [Path(bpy.data.filepath)] if bpy.data.filepath else []
 
 
 register, unregister = registration(SKINWRIGHT_OT_check_weights, SKINWRIGHT_OT_show_worst_pose)

@@ -28,7 +28,7 @@ class SKINWRIGHT_OT_desparsify(DesparsifySettings, SkinwrightOperator):
         """All meshes, or none where one is refused."""
         params = self.to_params(preferences.threads(context))
         with mesh.object_mode(context):
-            reports = desparsify_all(_targets(context), params)
+            reports = desparsify_all(_targets(context), params, before_write=self.keep_before)
         for report in reports:
             self.report({"INFO"}, report.sentence())
         return {"FINISHED"}

@@ -44,7 +44,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         vertices = sum(len(target.data.vertices) for target in targets(context))
         if vertices < LONG_WORK_VERTICES or self.freeze:
             return self.execute(context)
-        return self.attempt(lambda: self.begin(context, steps(*self._inputs(context))))
+        return self.attempt(lambda: self.begin(context, steps(*self._inputs(context), before_write=self.keep_before)))
 
     def draw(self, _context: Context) -> None:
         """The redo panel."""
@@ -63,7 +63,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         if self.freeze:
             self.report({"INFO"}, "Frozen: changes take effect once Freeze Operator is off")
             return {"FINISHED"}
-        return self.complete(context, transfer_weights(*self._inputs(context)))
+        return self.complete(context, transfer_weights(*self._inputs(context), before_write=self.keep_before))
 
     def complete(self, _context: Context, report: Report) -> set[str]:
         """Say what was done."""

@@ -62,7 +62,7 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> Sc
             positions = sculpts["positions"][number]
             touched = np.flatnonzero(np.isfinite(positions).all(axis=1))
             session.sculpt(touched, positions[touched].astype(np.float32))
-    except ValueError:
+    except BaseException:
         session.cancel()
         raise
     return session.commit()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .. import csr, native
 from ..desparsify import DesparsifyParams, desparsify
 from ..reporting import SculptReport
-from ..scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups
+from ..scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups, weight_state
 from ..scene.error import SceneError
 from .params import SculptParams as SculptOptions
 
@@ -43,7 +43,7 @@ class SculptSession:
         self.options = options or SculptOptions()
         rig = sculpting.check(obj)
         self.target_name, self.rig_name = obj.name, rig.name
-        self._weights_before = vertex_groups.snapshot(obj)
+        self._weights_before = weight_state.capture(obj)
         self._shape = rest_shape.read(obj)
         self._rotations: dict[int, dict[str, Quaternion]] = {}
         self._guarded: set[int] = set()
@@ -53,7 +53,7 @@ class SculptSession:
                 params = DesparsifyParams(self.options.candidates, self.options.method, threads=self.options.threads)
                 desparsify(obj, params)
             self._prepare(obj, rig)
-        except (SceneError, native.NativeError):
+        except BaseException:
             self._restore(obj)
             raise
 
@@ -205,7 +205,7 @@ class SculptSession:
             self._restore(obj)
 
     def _restore(self, obj: bpy.types.Object) -> None:
-        vertex_groups.restore(obj, self._weights_before)
+        weight_state.apply(obj, self._weights_before)
         rest_shape.restore(obj, self._shape)
         obj.data.update()
 

@@ -1,10 +1,13 @@
 """Weights from a body to garments, without an operator or a window: read, compute, write."""
 
-import bpy
+from collections.abc import Callable, Sequence
 
-from .. import jobs
+import bpy
+import numpy as np
+
+from .. import csr, jobs, soundness
 from ..reporting import Report
-from ..scene import mesh
+from ..scene import mesh, weight_state
 from ..scene.error import SceneError
 from .checks import check_source, source_warnings, target_problem
 from .compute import Failure, compute
@@ -15,18 +18,29 @@ from .write import Plan, plan, write
 __all__ = ["Mask", "TransferParams", "from_json", "steps", "to_json", "transfer_weights"]
 
 
-def transfer_weights(
-    context: bpy.types.Context, source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
-) -> Report:
-    """Transfer from `source` to each of `targets`; all of them are computed before the first is written.
+BeforeWrite = Callable[[Sequence[bpy.types.Object]], None]
 
-    Raises SceneError or native.NativeError with a sentence; then nothing has been written.
+
+def transfer_weights(
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    targets: list[bpy.types.Object],
+    params: TransferParams,
+    before_write: BeforeWrite | None = None,
+) -> Report:
+    """Transfer from `source` to each of `targets`: all are computed before the first is written, and all or none are.
+
+    `before_write` is told when writing begins. Raises SceneError or native.NativeError with a sentence.
     """
-    return jobs.wait(steps(context, source, targets, params))
+    return jobs.wait(steps(context, source, targets, params, before_write))
 
 
 def steps(
-    context: bpy.types.Context, source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    targets: list[bpy.types.Object],
+    params: TransferParams,
+    before_write: BeforeWrite | None = None,
 ) -> jobs.Jobs[Report]:
     """The same as a generator of jobs, for a window that must live on meanwhile."""
     check_source(source, targets)
@@ -38,7 +52,13 @@ def steps(
         failures += unsolved + unbindable
         if failures and not (params.skip_failing and plans):
             raise SceneError("; ".join(failure.sentence for failure in failures))
-        reports = [write(body, planned, params) for planned in plans]
+        for planned in plans:
+            last_look(body, planned)
+        written = [planned.garment.object for planned in plans]
+        if before_write:
+            before_write(written)
+        with weight_state.all_or_nothing(written):
+            reports = [write(body, planned, params) for planned in plans]
     warnings = source_warnings(body, reports[0].native)
     return Report(body.name, reports, warnings, [failure.sentence for failure in failures])
 
@@ -68,3 +88,13 @@ def _plan(body: Body, garments: list[Garment], results: dict) -> tuple[list[Plan
         except SceneError as error:
             failures.append(Failure(garment.object.name, str(error)))
     return plans, failures
+
+
+def last_look(body: Body, planned: Plan) -> None:
+    """Raise Unsound for rows that are no weights, before the first garment is written."""
+    garment, result = planned.garment, planned.result
+    name, bones = garment.object.name, np.array([name not in body.fields for name in result.names], bool)
+    soundness.check(name, result.rows)
+    complete = not garment.locks and set(body.bones) <= body.chosen
+    rows = csr.take_rows(result.rows, np.flatnonzero(result.written))
+    soundness.check_sums(name, rows, bones, least=1.0 if complete else 0.0)

@@ -4,10 +4,9 @@ import bpy
 from bpy.types import Context, Panel, UILayout
 
 from ..check import shown
+from ..match.painting import BRUSH_WEIGHTS, brush_value
 from ..match.session import current_of
 from .panel import Tab
-
-BRUSH_VALUES = (("Inpaint", 0.0), ("Automatic", 0.5), ("Match", 1.0))
 
 
 class SKINWRIGHT_PT_match(Tab, Panel):
@@ -38,12 +37,10 @@ def _draw_painting(layout: UILayout, context: Context) -> None:
     row.operator("skinwright.end_match_mask", text="Keep", icon="CHECKMARK").keep = True
     row.operator("skinwright.end_match_mask", text="Cancel", icon="X").keep = False
     row = layout.row(align=True)
-    path = "tool_settings.weight_paint" if bpy.app.version >= (5, 0, 0) else "tool_settings"
-    path += ".unified_paint_settings"
-    for text, value in BRUSH_VALUES:
-        pressed = abs(context.path_resolve(path).weight - value) < 0.01
-        button = row.operator("wm.context_set_float", text=text, depress=pressed)
-        button.data_path, button.value = path + ".weight", value
+    painted = brush_value(context)
+    for value in BRUSH_WEIGHTS:
+        button = row.operator("skinwright.mask_brush", text=value.title(), depress=painted == value)
+        button.value = value
     layout.prop(context.scene.skinwright.overlay, "live")
 
 

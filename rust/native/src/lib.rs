@@ -8,6 +8,7 @@ mod inpainting;
 mod job;
 mod penetration;
 mod ranges;
+mod refine;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -35,9 +36,11 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::penetration::penetration;
     #[pymodule_export]
+    use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
-    use crate::skinning::linear_blend;
+    use crate::skinning::{dual_quaternion_blend, linear_blend};
     #[pymodule_export]
     use crate::source::{Source, transfer_weights};
     #[pymodule_export]

@@ -44,3 +44,20 @@ pub fn linear_blend<'py>(
     let weights = weights.to_core(py)?;
     vectors(py, enter(py, threads, || core::linear_blend(&rest, &weights, &pose))?)
 }
+
+/// Dual quaternion skinning as Blender's Armature modifier does it with Preserve Volume. `rest_bones` (B, 4, 4), the bones'
+/// rest matrices, matter only where bones scale.
+#[pyfunction]
+#[pyo3(signature = (rest_positions, weights, pose_from_rest, *, rest_bones=None, threads=0))]
+pub fn dual_quaternion_blend<'py>(
+    py: Python<'py>,
+    rest_positions: Matrix<'py, f32>,
+    weights: &Weights,
+    pose_from_rest: Stack<'py, f64>,
+    rest_bones: Option<Stack<'py, f64>>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let (rest, matrices) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
+    let (weights, bones) = (weights.to_core(py)?, rest_bones.as_ref().map(pose).transpose()?);
+    vectors(py, enter(py, threads, || core::dual_quaternion_blend(&rest, &weights, &matrices, bones.as_deref()))?)
+}
