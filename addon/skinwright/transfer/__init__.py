@@ -95,6 +95,6 @@ def last_look(body: Body, planned: Plan) -> None:
     garment, result = planned.garment, planned.result
     name, bones = garment.object.name, np.array([name not in body.fields for name in result.names], bool)
     soundness.check(name, result.rows)
-    complete = not garment.locks and set(body.bones) <= body.chosen
+    complete = not garment.held.any() and not body.is_partial
     rows = csr.take_rows(result.rows, np.flatnonzero(result.written))
     soundness.check_sums(name, rows, bones, least=1.0 if complete else 0.0)
