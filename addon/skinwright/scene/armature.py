@@ -43,12 +43,14 @@ def is_posed(armature: bpy.types.Object) -> bool:
     return any(not bone.matrix_basis.is_identity for bone in armature.pose.bones)
 
 
-def attach(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
+def attach(obj: bpy.types.Object, armature: bpy.types.Object) -> bpy.types.ArmatureModifier:
     """Add an Armature modifier: after mirroring, which needs the rest shape, and before all that builds on the pose."""
     modifier = obj.modifiers.new(armature.name, "ARMATURE")
     modifier.object = armature
     mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
+    name = modifier.name
     obj.modifiers.move(len(obj.modifiers) - 1, mirrors[-1] + 1 if mirrors else 0)
+    return obj.modifiers[name]
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:

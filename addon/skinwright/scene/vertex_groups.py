@@ -60,6 +60,14 @@ def activate(obj: bpy.types.Object, name: str) -> None:
         obj.vertex_groups.active = obj.vertex_groups[name]
 
 
+def remove(obj: bpy.types.Object, names: Sequence[str]) -> None:
+    """Remove the groups of these names; the active one stays active."""
+    active = obj.vertex_groups.active.name if obj.vertex_groups.active else ""
+    for group in [obj.vertex_groups[name] for name in names if name in obj.vertex_groups]:
+        obj.vertex_groups.remove(group)
+    activate(obj, active)
+
+
 def locked(obj: bpy.types.Object) -> set[str]:
     """Names of the groups the artist has locked."""
     return {group.name for group in obj.vertex_groups if group.lock_weight}

@@ -33,6 +33,13 @@ class SKINWRIGHT_PG_object(PropertyGroup):
         options={"HIDDEN"},
     )
 
+    painting: BoolProperty(
+        name="Painting",
+        description="The match mask is being painted; undo has gone back to before that where this is off",
+        default=False,
+        options={"HIDDEN"},
+    )
+
     def mask(self) -> Mask | None:
         """The mask as plain values, if there is one."""
         if not self.mask_group:
