@@ -1,5 +1,6 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,12 +61,14 @@ class Report:
 
 
 def _plain(value: Any) -> Any:
-    """The same with numpy's scalars and arrays as Python's."""
+    """The same with numpy's scalars and arrays as Python's; JSON has no numbers that are not finite, so None."""
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
-    return value.tolist() if hasattr(value, "tolist") else value
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True)

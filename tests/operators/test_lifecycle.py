@@ -85,7 +85,7 @@ def test_names_and_descriptions(addon):
 def test_panel_and_operator_have_the_same_settings(addon):
     operator = bpy.ops.skinwright.transfer_weights.get_rna_type().properties
     panel = bpy.context.scene.skinwright.transfer.bl_rna.properties
-    for name in addon.settings.TransferOptions.__annotations__:
+    for name in addon.settings.TransferSettings.__annotations__:
         pair = operator[name], panel[name]
         assert len({prop.type for prop in pair}) == len({prop.description for prop in pair}) == 1
         assert pair[0].default == pair[1].default

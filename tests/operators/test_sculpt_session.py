@@ -366,29 +366,8 @@ def hidden(obj, rig):
     obj.modifiers["Armature"].show_viewport = False
 
 
-def two_armatures(obj, rig):
-    obj.modifiers.new("Second", "ARMATURE").object = rig
-
-
-def preserve_volume(obj, rig):
-    obj.modifiers["Armature"].use_deform_preserve_volume = True
-
-
 def envelopes(obj, rig):
     obj.modifiers["Armature"].use_bone_envelopes = True
-
-
-def masked(obj, rig):
-    obj.modifiers["Armature"].vertex_group = "pin"
-
-
-def mirrored(obj, rig):
-    obj.modifiers.new("Mirror", "MIRROR")
-    obj.modifiers.move(1, 0)
-
-
-def bendy(obj, rig):
-    rig.data.bones["Knee"].bbone_segments = 4
 
 
 def envelope_multiply(obj, rig):
@@ -399,21 +378,34 @@ def unbound(obj, rig):
     obj.vertex_groups.clear()
 
 
+def two_rigs(obj, rig):
+    other = bpy.data.objects.new("Other", rig.data)
+    bpy.context.scene.collection.objects.link(other)
+    obj.modifiers.new("Second", "ARMATURE").object = other
+
+
+def multi(obj, rig):
+    obj.modifiers["Armature"].use_multi_modifier = True
+
+
+def half_masked(obj, rig):
+    obj.vertex_groups.new(name="half").add(list(range(144)), 0.5, "REPLACE")
+    obj.modifiers["Armature"].vertex_group = "half"
+
+
+def displaced(obj, rig):
+    obj.modifiers.new("Displace", "DISPLACE")
+    obj.modifiers.move(1, 0)
+
+
+def reweighted(obj, rig):
+    obj.modifiers.new("Edit", "VERTEX_WEIGHT_EDIT")
+    obj.modifiers.move(1, 0)
+
+
 def absolute_keys(obj, rig):
     obj.shape_key_add(name="Basis")
     obj.data.shape_keys.use_relative = False
-
-
-def another_key(obj, rig):
-    obj.shape_key_add(name="Basis")
-    obj.shape_key_add(name="Smile")
-    obj.active_shape_key_index = 1
-
-
-def mixed_key(obj, rig):
-    obj.shape_key_add(name="Basis")
-    obj.shape_key_add(name="Smile").value = 0.5
-    obj.active_shape_key_index = 0
 
 
 def no_keyframes(obj, rig):
@@ -424,17 +416,15 @@ REFUSALS = [
     (multires, "Multiresolution modifier Multires"),
     (no_armature, "Body has no Armature modifier"),
     (hidden, "The Armature modifier Armature of Body is hidden"),
-    (two_armatures, "Body is deformed by 2 Armature modifiers"),
-    (preserve_volume, "instead of mixing positions.*turn Preserve Volume off"),
+    (two_rigs, "Body is deformed by Other and Rig at once"),
+    (multi, "turn Multi Modifier off"),
+    (half_masked, "No vertex of Body is moved by exactly one Armature modifier in full"),
+    (displaced, "The modifier Displace of Body changes the shape before the armature moves it"),
+    (reweighted, "The modifier Edit of Body changes the weights before the armature uses them"),
     (envelopes, "binds by bone envelopes"),
-    (masked, "acts through the group pin only"),
-    (mirrored, "The modifier Mirror of Body changes the shape before the armature moves it"),
-    (bendy, "Bone Knee of Rig bends: set its Bendy Bones Segments to 1"),
     (envelope_multiply, "Bone Knee of Rig multiplies weights by its envelope"),
     (unbound, "no vertex group of a deform bone of Rig"),
     (absolute_keys, "absolute shape keys"),
-    (another_key, "The shape key Smile of Body is active.*make Basis the active one"),
-    (mixed_key, "The shape key Smile of Body changes its shape at rest"),
     (no_keyframes, "Rig has no keyframes"),
 ]
 

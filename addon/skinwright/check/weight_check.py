@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .. import csr
 from ..scene import armature, depth, mesh, poses, vertex_groups
 from ..scene.error import SceneError
+from .params import CheckParams
 
 SUM_TOLERANCE = 1e-4
 # An edge longer by less than this part of the mesh's diagonal is no offender, however short it was.
@@ -28,19 +29,6 @@ class Fault(Enum):
     STRETCHED = "on stretched edges"
     TORN = "on torn edges"
     PENETRATING = "deeper in the body than at rest"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """`stretched` and `torn` are lengths over lengths at rest; `deeper` a part of the body's diagonal; radians."""
-
-    max_influences: int = 4
-    stretched: float = 2.0
-    torn: float = 4.0
-    deeper: float = 0.005
-    poses: str = "RANGE"
-    angle: float = np.pi / 4
-    most_frames: int = 40
 
 
 @dataclass
@@ -71,7 +59,7 @@ class WeightCheck:
         return {"target": self.target, "vertices": self.vertices, "faults": faults, "poses": self.poses}
 
 
-def check(target: bpy.types.Object, body: bpy.types.Object | None, limits: Limits) -> WeightCheck:
+def check(target: bpy.types.Object, body: bpy.types.Object | None, limits: CheckParams) -> WeightCheck:
     """Look at the weights, then at each pose. Raises SceneError; the pose and the frame are restored."""
     rig = armature.find(target)
     if rig is None:
@@ -100,7 +88,7 @@ class _Garment:
     """The shapes at rest, and the sampled points whose depth in the body is compared."""
 
     def __init__(
-        self, target: bpy.types.Object, body: bpy.types.Object | None, rig: bpy.types.Object, limits: Limits
+        self, target: bpy.types.Object, body: bpy.types.Object | None, rig: bpy.types.Object, limits: CheckParams
     ) -> None:
         self.target, self.body, self.rig, self.limits = target, body, rig, limits
         self.edges = mesh.edges(target)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
+from ..errors import Refused
 
 _module: Any = None
 _import_error = ""
@@ -22,7 +23,7 @@ except ImportError as error:
     _import_error = str(error)
 
 
-class NativeError(ValueError):
+class NativeError(Refused):
     """What the native module answers to inputs it has no answer for: one sentence."""
 
 

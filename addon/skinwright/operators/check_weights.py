@@ -1,21 +1,30 @@
 """Check Weights: what is wrong with the weights of the selected meshes, in numbers and in test poses."""
 
-import json
 from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy.types import Context, Operator
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Context
 
-from ..check.weight_check import Fault, Limits, WeightCheck, check
+from .. import files
+from ..check.params import CheckParams
+from ..check.weight_check import Fault, WeightCheck, check
+from ..registration import registration
 from ..scene import mesh
-from ..scene.error import SceneError
+from ..settings.properties import properties, values
+from .base import SkinwrightOperator, selected_meshes
 
 FAULTS = [(fault.name, fault.name.replace("_", " ").title(), f"Vertices {fault.value}") for fault in Fault]
 
 
-class SKINWRIGHT_OT_check_weights(Operator):
+class _CheckSettings:
+    """The settings of a check; a mix-in."""
+
+    __annotations__ = properties(CheckParams, ["poses", "angle", "max_influences", "stretched", "torn"])
+
+
+class SKINWRIGHT_OT_check_weights(_CheckSettings, SkinwrightOperator):
     """Selects the offenders, so that Edit mode shows them; the pose is as before."""
 
     bl_idname = "skinwright.check_weights"
@@ -23,26 +32,6 @@ class SKINWRIGHT_OT_check_weights(Operator):
     bl_description = "Put the armature through test poses and select the vertices whose weights do badly"
     bl_options = {"REGISTER", "UNDO"}
 
-    poses: EnumProperty(
-        name="Poses",
-        description="What the armature is put through",
-        items=[
-            ("RANGE", "Range of Motion", "Bend and twist the bones, those equally deep in the hierarchy together"),
-            ("ACTION", "Keyframes", "The frames that have keys in the armature's action"),
-        ],
-    )
-    angle: FloatProperty(
-        name="Angle", description="How far bones are bent", default=np.pi / 4, min=0, max=np.pi, subtype="ANGLE"
-    )
-    max_influences: IntProperty(
-        name="Limit", description="Most bones a vertex may follow; 0 sets no limit", default=4, min=0, soft_max=8
-    )
-    stretched: FloatProperty(
-        name="Stretched", description="Times its length at rest from which an edge is stretched", default=2, min=1
-    )
-    torn: FloatProperty(
-        name="Torn", description="Times its length at rest from which an edge is torn", default=4, min=1
-    )
     select: EnumProperty(
         name="Select",
         description="Which offenders to select",
@@ -51,25 +40,32 @@ class SKINWRIGHT_OT_check_weights(Operator):
     filepath: StringProperty(
         name="Report", description="File to write the figures to as JSON; none if empty", subtype="FILE_PATH"
     )
+    overwrite: BoolProperty(
+        name="Overwrite", description="Let the report replace a file that is not a report", default=False
+    )
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        """Cheap, as it runs on every redraw."""
-        meshes = [obj for obj in context.selected_objects if obj.type == "MESH"]
-        cls.poll_message_set("Select the meshes to check, in Object mode")
-        return context.mode == "OBJECT" and bool(meshes)
+    def refusal(cls, context: Context) -> str:
+        """Object mode, and something to check."""
+        if context.mode == "OBJECT" and selected_meshes(context):
+            return ""
+        return "Select the meshes to check, in Object mode"
 
-    def execute(self, context: Context) -> set[str]:
+    def work(self, context: Context) -> set[str]:
         """Check each mesh; nothing but the selection changes."""
-        body = context.scene.skinwright.transfer.source
-        limits = Limits(self.max_influences, self.stretched, self.torn, poses=self.poses, angle=self.angle)
-        try:
-            targets = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != body]
-            checks = [check(obj, body, limits) for obj in targets or [context.object]]
-            self._write(checks)
-        except (SceneError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        settings = context.scene.skinwright.transfer
+        if not self.properties.is_property_set("max_influences"):
+            self.max_influences = settings.max_influences  # the limit is one setting
+        params = CheckParams(**values(self, CheckParams))
+        report = Path(bpy.path.abspath(self.filepath)) if self.filepath else None
+        if report:
+            files.check_output(report, others=_open_file(), overwrite=self.overwrite, replaces=files.REPORT)
+        targets = selected_meshes(context, without=settings.source) or selected_meshes(context)
+        checks = [check(obj, settings.source, params) for obj in targets]
+        if report:
+            files.write_report(
+                report, [result.to_json() for result in checks], others=_open_file(), overwrite=self.overwrite
+            )
         for result in checks:
             mesh.select(context.scene.objects[result.target], self._chosen(result))
             self.report({"WARNING" if any(result.counts().values()) else "INFO"}, result.sentence())
@@ -79,17 +75,10 @@ class SKINWRIGHT_OT_check_weights(Operator):
         chosen = result.faulty.values() if self.select == "ALL" else [result.faulty[Fault[self.select]]]
         return np.logical_or.reduce(list(chosen))
 
-    def _write(self, checks: list[WeightCheck]) -> None:
-        if self.filepath:
-            content = [result.to_json() for result in checks]
-            Path(bpy.path.abspath(self.filepath)).write_text(json.dumps(content, indent=2) + "\n")
+
+def _open_file() -> list[Path]:
+    """The .blend that is open, which no report replaces."""
+    return [Path(bpy.data.filepath)] if bpy.data.filepath else []
 
 
-def register() -> None:
-    """Register the operator."""
-    bpy.utils.register_class(SKINWRIGHT_OT_check_weights)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    bpy.utils.unregister_class(SKINWRIGHT_OT_check_weights)
+register, unregister = registration(SKINWRIGHT_OT_check_weights)

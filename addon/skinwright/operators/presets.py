@@ -6,7 +6,8 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.types import Operator
 
-from ..settings import TransferOptions
+from ..registration import registration
+from ..settings import TransferSettings
 
 PRESET_PATH = os.path.dirname(os.path.dirname(__file__))
 
@@ -20,16 +21,19 @@ class SKINWRIGHT_OT_transfer_preset_add(AddPresetBase, Operator):
     preset_menu = "SKINWRIGHT_PT_transfer_presets"
     preset_subdir = "skinwright/transfer_weights"
     preset_defines = ["settings = bpy.context.scene.skinwright.transfer"]
-    preset_values = [f"settings.{name}" for name in TransferOptions.__annotations__]
+    preset_values = [f"settings.{name}" for name in TransferSettings.__annotations__]
+
+
+_register, _unregister = registration(SKINWRIGHT_OT_transfer_preset_add)
 
 
 def register() -> None:
     """Register the operator and the folder of presets."""
-    bpy.utils.register_class(SKINWRIGHT_OT_transfer_preset_add)
+    _register()
     bpy.utils.register_preset_path(PRESET_PATH)
 
 
 def unregister() -> None:
     """Unregister both."""
     bpy.utils.unregister_preset_path(PRESET_PATH)
-    bpy.utils.unregister_class(SKINWRIGHT_OT_transfer_preset_add)
+    _unregister()

@@ -8,8 +8,8 @@ from gpu_extras.batch import batch_for_shader
 from numpy.typing import ArrayLike
 
 from ..match.session import Category
-from .picture import Histogram, Picture
 from . import colours
+from .picture import Histogram, Picture
 
 TITLES = {"MATCH": "Match", "INFLUENCES": "Influences", "STRETCH": "Stretch"}
 TEXT = (0.95, 0.95, 0.95, 1.0)

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..match import session as match_session
 from ..csr import Rows
+from ..match import session as match_session
 from ..match.session import Category, Match, MatchSession
 from ..scene import armature, changes, deformation, mesh, vertex_groups
 from ..transfer.params import TransferParams

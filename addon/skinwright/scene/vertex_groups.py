@@ -93,6 +93,14 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
 
 
+def values(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
+    """(V,) the weights of one group, 0 where a vertex is no member."""
+    rows = read(obj, [name])
+    weights = np.zeros(len(rows.indptr) - 1, np.float32)
+    weights[np.diff(rows.indptr).astype(bool)] = rows.values
+    return weights
+
+
 def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDArray[np.integer] | None = None) -> None:
     """Make row r the memberships of vertex vertices[r] in the groups `names`; not in Edit mode.
 

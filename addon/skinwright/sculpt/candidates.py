@@ -10,6 +10,7 @@ from .. import csr
 from ..csr import Rows
 from ..desparsify import DesparsifyParams, nearest_bones
 from ..scene import armature, vertex_groups
+from .params import SculptParams
 
 # Of the solver: skinwright_core::sculpt::MAX_MEMBERS.
 MOST_MEMBERS = 12
@@ -28,8 +29,8 @@ class Candidates:
     cut: NDArray[np.bool_]
 
 
-def choose(obj: bpy.types.Object, rig: bpy.types.Object, params: DesparsifyParams) -> Candidates:
-    """Candidates among the deform bones that have members on this mesh; `params.n` 0 adds none.
+def choose(obj: bpy.types.Object, rig: bpy.types.Object, options: SculptParams) -> Candidates:
+    """Candidates among the deform bones that have members on this mesh.
 
     A bone that deforms nothing here is not offered: controls that were left to deform would win weights otherwise.
     """
@@ -42,7 +43,8 @@ def choose(obj: bpy.types.Object, rig: bpy.types.Object, params: DesparsifyParam
     counts = np.diff(before.indptr).astype(np.int64)
     cut = counts > MOST_MEMBERS
     rows = _normalised_where(csr.keep_largest(before, np.full(len(counts), MOST_MEMBERS)), before, cut)
-    if params.n and names:
+    if options.candidates and names:
+        params = DesparsifyParams(options.candidates, options.method, threads=options.threads)
         rows = _joined(rows, nearest_bones(obj, rig, names, rows, params), len(names))
     return Candidates(names, before, rows, cut)
 

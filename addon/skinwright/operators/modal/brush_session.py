@@ -94,6 +94,9 @@ class BrushSession:
     def resume(self) -> None:
         """The file has been saved, and the session goes on."""
 
+    def forget(self) -> None:
+        """Nothing shows the session any more. Touches nothing of Blender's: the file may be another by now."""
+
     def release(self, context: Context) -> None:
         """Give up whatever else the session holds: jobs, overlays."""
 

@@ -1,6 +1,5 @@
 """The order in which a session ends, whatever has happened: each part is tried, and what fails is said."""
 
-import traceback
 from collections.abc import Callable
 from enum import Enum
 from typing import Any
@@ -8,10 +7,9 @@ from typing import Any
 import bpy
 from bpy.types import Context
 
-from ...native import NativeError
+from ...errors import Refused, internal
 from ...scene import mesh, modes
-from ...scene.error import SceneError
-from . import brush_session, status
+from . import brush_session, status, undo
 from .brush_session import BrushSession, Message
 
 
@@ -37,13 +35,12 @@ class _Attempts:
     def run(self, part: Callable[..., Any], *arguments: Any, otherwise: str) -> bool:
         try:
             result = part(*arguments)
-        except (SceneError, NativeError, RuntimeError) as error:
+        except (Refused, RuntimeError) as error:
             self.messages.append(Message("WARNING", f"{otherwise}: {error}"))
             return False
         except BaseException as error:
-            # A panic of the native module is no Exception. What is not expected is shown in the console as well.
-            traceback.print_exc()
-            self.messages.append(Message("ERROR", f"{otherwise}: {type(error).__name__}: {error}"))
+            # A panic of the native module is no Exception.
+            self.messages.append(Message("ERROR", f"{otherwise}: {internal(error)}"))
             return False
         if isinstance(result, list):
             self.messages += result
@@ -60,6 +57,7 @@ def end(context: Context, session: BrushSession, ending: Ending, why: str = "") 
     obj = session.target()
     if obj and ending is not Ending.UNDONE:
         attempts.run(_write, context, session, ending, attempts, otherwise=f"{obj.name} could not be restored")
+    session.forget()
     attempts.run(session.release, context, otherwise=f"{session.label} left something behind")
     attempts.run(session.set_flag, False, otherwise=f"{session.label} left a mark")
     attempts.run(_leave, session, ending, otherwise="The mode is as it was")
@@ -71,6 +69,11 @@ def _write(context: Context, session: BrushSession, ending: Ending, attempts: _A
     name = session.object.name
     if ending is not Ending.BROKEN:
         attempts.run(session.settle, context, otherwise=f"The last stroke on {name} is lost")
+    # The brushes' own steps hold nothing but what a brush has moved: from a step within the session that holds all,
+    # undo leads through them with the session's flag on the object.
+    attempts.run(_push, session.label, otherwise=f"Undo of {session.label} takes several steps")
+    if ending in (Ending.KEEP, Ending.CANCEL) and session.changed_elsewhere(session.target()):
+        attempts.run(_back_to_the_mesh, name, otherwise=f"The vertices of {name} are not those that were sculpted")
     with mesh.object_mode(context):
         if ending is Ending.CANCEL:
             _cancel(context, session, attempts)
@@ -78,6 +81,16 @@ def _write(context: Context, session: BrushSession, ending: Ending, attempts: _A
             restored = attempts.run(session.restore, otherwise=f"{name} stays as it is")
             if restored:
                 attempts.messages.append(Message("WARNING", f"{name} is as it was before {session.label}"))
+
+
+def _back_to_the_mesh(name: str) -> list[Message]:
+    """To before the session, as only Blender's undo knows the mesh from before it was remeshed."""
+    undo.leave_session()
+    return [Message("WARNING", f"{name} had other vertices: all that was done since the session began is undone")]
+
+
+def _push(message: str) -> None:
+    bpy.ops.ed.undo_push(message=message)
 
 
 def _cancel(context: Context, session: BrushSession, attempts: _Attempts) -> None:
@@ -94,7 +107,7 @@ def _step_of_work(context: Context, session: BrushSession) -> None:
     session.keep(context)
     session.set_flag(False)
     modes.go_to(session.target(), session.mode_before)
-    bpy.ops.ed.undo_push(message=session.label)
+    _push(session.label)
 
 
 def _leave(session: BrushSession, ending: Ending) -> None:

@@ -78,6 +78,8 @@ def _view(window: bpy.types.Window) -> bpy.types.Area | None:
 
 
 def _forget() -> None:
+    if brush_session.current:
+        brush_session.current.forget()
     brush_session.current = brush_session.ended = None
 
 

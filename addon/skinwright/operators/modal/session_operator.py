@@ -1,13 +1,10 @@
 """Base of the operators that run beside Blender's brushes. No exception leaves them or leaves a session behind."""
 
-import traceback
-
 import bpy
 from bpy.types import Context, Event, Operator
 
-from ...native import NativeError
+from ...errors import Refused, internal
 from ...scene import changes
-from ...scene.error import SceneError
 from . import brush_session, ending, held_input, keep_alive, status, timers
 from .brush_session import BrushSession, Message
 from .ending import Ending
@@ -43,7 +40,7 @@ class SessionOperator(Operator):
     def _begun(self, context: Context) -> BrushSession | None:
         try:
             session = self.make(context)
-        except (SceneError, NativeError) as error:
+        except Refused as error:
             self.report({"ERROR"}, str(error))
             return None
         # The way back from the session leads to the first of these steps, the second is where its strokes begin.
@@ -53,7 +50,7 @@ class SessionOperator(Operator):
             session.set_flag(True)
             session.enter(context)
         except BaseException as error:
-            self._tell(ending.end(context, session, Ending.BROKEN, f"{session.label} cannot begin: {error}"))
+            self._tell(ending.end(context, session, Ending.BROKEN, f"{session.label} cannot begin: {_reason(error)}"))
             return None
         bpy.ops.ed.undo_push(message=session.label)
         return session
@@ -67,8 +64,8 @@ class SessionOperator(Operator):
         try:
             result = self._handle(context, event)
         except BaseException as error:
-            traceback.print_exc()
-            problem = f"{session.label} has ended because of an error: {type(error).__name__}: {error}"
+            internal(error)  # its traceback belongs on the console
+            problem = f"{session.label} has ended because of an error ({type(error).__name__}: {error})"
             result = self._end(context, Ending.BROKEN, problem)
         return result
 
@@ -171,6 +168,10 @@ def _aside(context: Context, session: BrushSession) -> str:
     if active and active != session.target() and active.mode == session.mode:
         return f"{active.name} is under the brush now"
     return ""
+
+
+def _reason(error: BaseException) -> str:
+    return str(error) if isinstance(error, Refused) else internal(error)
 
 
 def _show(context: Context, session: BrushSession) -> None:

@@ -6,7 +6,8 @@ goes on in the same direction until it is outside. So nothing else that the arti
 would be if the steps were taken back when the session ends.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import bpy
 from bpy.app.handlers import persistent, redo_post, undo_post
@@ -14,7 +15,8 @@ from bpy.app.handlers import persistent, redo_post, undo_post
 from ...scene import modes
 from . import brush_session
 
-_MOST_STEPS = 1000
+# Beyond Blender's own limit of 256.
+_MOST_STEPS = 300
 
 _going_on = False
 _back = True
@@ -42,16 +44,29 @@ def _arrived(back: bool) -> None:
 
 def _go_on() -> None:
     """Leave the states within a session; should no step lead out, restore the object from what the session kept."""
-    global _going_on
     window = next(iter(bpy.context.window_manager.windows), None)
     if window is None or brush_session.current:
         return
+    with bpy.context.temp_override(window=window, screen=window.screen), _no_handlers():
+        step = bpy.ops.ed.undo if _back else bpy.ops.ed.redo
+        if not _until_outside(step) and not _until_outside(bpy.ops.ed.undo):
+            _restore()
+
+
+def leave_session() -> None:
+    """Undo until before the session that has just ended. Raises RuntimeError if Blender remembers no such state."""
+    with _no_handlers():
+        if not _until_outside(bpy.ops.ed.undo):
+            raise RuntimeError("Blender no longer remembers the state before the session")
+
+
+@contextmanager
+def _no_handlers() -> Iterator[None]:
+    """What is undone here is not followed up."""
+    global _going_on
     _going_on = True
     try:
-        with bpy.context.temp_override(window=window, screen=window.screen):
-            step = bpy.ops.ed.undo if _back else bpy.ops.ed.redo
-            if not _until_outside(step) and not _until_outside(bpy.ops.ed.undo):
-                _restore()
+        yield
     finally:
         _going_on = False
 

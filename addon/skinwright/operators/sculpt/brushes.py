@@ -6,9 +6,8 @@ something has changed while no other operator holds the input, and the session l
 
 from bpy.types import Context, Event, Object
 
-from ...native import NativeError
+from ...errors import Refused
 from ...scene import modes
-from ...scene.error import SceneError
 from ...sculpt import session as sculpt_session
 from ...sculpt.session import Outcome, SculptOptions, SculptSession
 from ..modal.brush_session import BrushSession, Message
@@ -67,7 +66,7 @@ class SculptBrushes(BrushSession):
     def _look(self, context: Context) -> None:
         try:
             outcome = self._watch.look(context.scene.skinwright.sculpt.kappa)
-        except (SceneError, NativeError) as error:
+        except Refused as error:
             self.news = str(error)
             return
         if outcome:
@@ -122,8 +121,8 @@ class SculptBrushes(BrushSession):
         if not self.changed_elsewhere(self.target()):
             self.session.assert_state()
 
-    def release(self, _context: Context) -> None:
-        """Nothing shows the session any more."""
+    def forget(self) -> None:
+        """The panel shows the button to begin again."""
         sculpt_session.current = None
 
 
