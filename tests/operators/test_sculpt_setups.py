@@ -226,6 +226,45 @@ def test_a_brush_makes_what_blender_shows_the_goal(sculpt, body, rig, setup):
     assert reached < missed
 
 
+def test_a_key_that_the_pose_drives_gives_each_pose_its_rest_shape(sculpt, body, rig):
+    driven_key(body, rig)
+    bend(rig)
+    chosen = np.arange(0, 144, dtype=np.uint32)
+    wanted = goal(sculpt, body, chosen)
+    rig.pose.bones["Knee"].rotation_quaternion = (1, 0, 0, 0)
+    bpy.context.view_layer.update()
+    session = sculpt.SculptSession(body, sculpt.SculptOptions(kappa=0.001, candidates=3))
+    bend(rig)
+    session.sculpt(chosen, wanted.astype(np.float32))
+    assert np.linalg.norm(posed(body) - wanted, axis=1).max() < 3e-3
+
+
+def test_copies_have_the_same_candidates(sculpt, rig, scene):
+    """Along the surface, one side of the seam is next to Knee, the other to Heel."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    heel = rig.data.edit_bones.new("Heel")
+    heel.head, heel.tail = (3, 0, 0), (3, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    left, right = builders.grid("Body", 6), builders.grid("Other", 6)
+    for vertex in right.data.vertices:
+        vertex.co.x += 2.0
+    builders.select(left)
+    right.select_set(True)
+    bpy.ops.object.join()
+    x = np.array([vertex.co.x for vertex in left.data.vertices]) / 4 + 0.25
+    between = np.where((x > 0.1) & (x < 0.9), 1.0, np.nan)
+    ends = {"Knee": np.where(x <= 0.1, 1.0, np.nan), "Heel": np.where(x >= 0.9, 1.0, np.nan)}
+    builders.paint(left, Hip=(1 - x) * between, Toe=x * between, **ends)
+    left.modifiers.new("Armature", "ARMATURE").object = rig
+    session = sculpt.SculptSession(left, sculpt.SculptOptions(candidates=3))
+    session.open()
+    rest = [tuple(vertex.co) for vertex in left.data.vertices]
+    rows = builders.weights(left)
+    twins = [(i, j) for i in range(36) for j in range(36, 72) if np.allclose(rest[i], rest[j])]
+    assert len(twins) == 6
+    assert all(rows[i] == rows[j] and len(rows[i]) == 3 for i, j in twins)
+
+
 def test_copies_of_a_vertex_are_sculpted_as_one(sculpt, rig, scene):
     """A seam without a shared edge; the brush touches one side of it only."""
     left, right = builders.grid("Body", 6), builders.grid("Other", 6)

@@ -36,7 +36,7 @@ from .params import SculptParams as SculptOptions
 # Every keyframe costs a pass over the mesh when a session begins.
 MOST_GUARD_FRAMES = 24
 # Of a stroke where driven shape keys change the rest shape.
-_PASSES = 3
+_PASSES = 6
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class SculptSession:
         """Solve; where driven shape keys give this pose another rest shape, targets are corrected for what that adds.
 
         The solver has one rest shape. The difference d of this pose's adds T(w) d, which is taken off the targets for
-        the weights w of the pass before; d is small against the body, and three passes leave 1e-6 of it.
+        the weights w of the pass before; where d is small against the body, few passes are enough.
         """
         here = shape_keys.mixed(obj, self._basis)[vertices]
         usual = self._mixed[vertices]

@@ -21,7 +21,7 @@ class SKINWRIGHT_OT_paint_match_mask(SessionOperator):
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Not beside another session."""
-        reason = session_operator.refusal() or ("" if session_operator.is_orphaned() else refusal(context))
+        reason = brush_session.refusal() or ("" if session_operator.is_orphaned() else refusal(context))
         cls.poll_message_set(reason)
         return not reason
 

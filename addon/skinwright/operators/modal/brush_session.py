@@ -109,6 +109,13 @@ ended: BrushSession | None = None
 FLAGS = ("sculpting", "painting")
 
 
+def refusal() -> str:
+    """Why nothing else may write weights now, or nothing: it would pull the ground from under the session."""
+    if current is None or current.orphaned:
+        return ""
+    return f"{current.label} runs on {current.object.name}: keep or cancel it first"
+
+
 def flagged() -> list[Object]:
     """The objects in a state within a session."""
     return [obj for obj in bpy.data.objects if any(getattr(obj.skinwright, flag) for flag in FLAGS)]

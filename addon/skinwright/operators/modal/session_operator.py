@@ -136,14 +136,6 @@ class SessionOperator(Operator):
             keep_alive.orphan(self._session)
 
 
-def refusal() -> str:
-    """Why no session can begin now, or nothing."""
-    session = brush_session.current
-    if session is None or session.orphaned:
-        return ""
-    return f"{session.label} runs on {session.object.name}: keep or cancel it first"
-
-
 def is_orphaned() -> bool:
     """Whether a session waits for an operator."""
     return brush_session.current is not None and brush_session.current.orphaned

@@ -5,7 +5,7 @@ from bpy.types import Context
 
 from ... import native, preferences
 from ...scene import sculpting
-from ..modal import session_operator
+from ..modal import brush_session, session_operator
 from ..modal.session_operator import SessionOperator
 from .brushes import SculptBrushes
 
@@ -34,8 +34,8 @@ class SKINWRIGHT_OT_sculpt_weights(SessionOperator):
 
 def refusal(context: Context) -> str:
     """Why weights cannot be sculpted now, or nothing."""
-    if native.problem() or session_operator.refusal():
-        return native.problem() or session_operator.refusal()
+    if native.problem() or brush_session.refusal():
+        return native.problem() or brush_session.refusal()
     if session_operator.is_orphaned():
         return ""
     if context.mode not in {"OBJECT", "SCULPT"}:
