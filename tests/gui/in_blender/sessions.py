@@ -357,13 +357,11 @@ def painting_ends_in_order(window: Window) -> Steps:
     kept = state("Dress")
     assert kept != bare
     window.key("Z", ctrl=True)
-    yield 1.2
-    assert state("Dress") == bare and nothing_is_left(), "one undo step for painting"
+    yield from until(lambda: state("Dress") == bare and nothing_is_left())
     window.key("Z", ctrl=True, shift=True)
-    yield 1.2
-    assert state("Dress") == kept and nothing_is_left()
+    yield from until(lambda: state("Dress") == kept and nothing_is_left())
     window.key("Z", ctrl=True)
-    yield 1.2
+    yield from until(lambda: state("Dress") == bare and nothing_is_left())
     yield from begin_painting(window)
     painting().tick = None  # what follows a stroke fails
     window.event("MOUSEMOVE")
@@ -374,11 +372,9 @@ def painting_ends_in_order(window: Window) -> Steps:
     yield from left_nothing(window)
     assert state("Dress") == bare
     window.key("Z", ctrl=True)
-    yield 0.8
-    assert state("Dress") != bare, "Esc is undone"
+    yield from until(lambda: state("Dress") != bare)
     window.key("Z", ctrl=True)
-    yield 1.0
-    assert state("Dress") == bare
+    yield from until(lambda: state("Dress") == bare and nothing_is_left())
 
 
 def disabled_in_a_session(window: Window) -> Steps:
