@@ -1,10 +1,12 @@
 """Operators, one file or folder per feature."""
 
 from . import check_weights, desparsify, match, presets, sculpt, stored_weights, transfer_weights
-from .modal import timers
+from .modal import keep_alive, timers, undo
 
 MODULES = (
     timers,
+    keep_alive,
+    undo,
     transfer_weights,
     presets,
     *match.MODULES,
