@@ -6,11 +6,13 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod biharmonic;
 pub mod desparsify;
 pub mod error;
 pub mod laplacian;
 pub mod mesh;
 pub mod progress;
+pub mod retarget;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;

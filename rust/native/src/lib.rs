@@ -1,10 +1,12 @@
 //! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
+mod biharmonic;
 mod desparsify;
 mod error;
 mod inpainting;
 mod job;
+mod retarget;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -18,6 +20,8 @@ use pyo3::prelude::*;
 #[pymodule]
 mod skinwright_native {
     #[pymodule_export]
+    use crate::biharmonic::biharmonic_embedding;
+    #[pymodule_export]
     use crate::desparsify::desparsify;
     #[pymodule_export]
     use crate::error::{
@@ -27,6 +31,8 @@ mod skinwright_native {
     use crate::inpainting::Inpainting;
     #[pymodule_export]
     use crate::job::Job;
+    #[pymodule_export]
+    use crate::retarget::{Retarget, retarget_weights, start_retarget_weights};
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
