@@ -4,6 +4,7 @@ mod arrays;
 mod biharmonic;
 mod desparsify;
 mod error;
+mod fill;
 mod inpainting;
 mod job;
 mod retarget;
@@ -27,6 +28,8 @@ mod skinwright_native {
     use crate::error::{
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
     };
+    #[pymodule_export]
+    use crate::fill::fill;
     #[pymodule_export]
     use crate::inpainting::Inpainting;
     #[pymodule_export]
