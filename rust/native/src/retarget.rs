@@ -69,8 +69,8 @@ macro_rules! retarget_function {
         #[pyfunction]
         #[pyo3(signature = (source_positions, source_triangles, source_weights, source_frames, source_lengths,
             target_positions, target_triangles, target_frames, target_lengths, *, bone_map, method="skeleton",
-            landmarks=None, max_influences=0, threads=0, source_parents=None, match_points="surface", registration=true,
-            normal_length=0.03, max_distance=0.08, max_normal_angle=1.3962634015954636, max_stretch=6.0, n_pairs=100,
+            landmarks=None, max_influences=0, threads=0, source_parents=None, match_points="surface", registration=false,
+            normal_length=0.02, max_distance=0.08, max_normal_angle=1.3962634015954636, max_stretch=6.0, n_pairs=100,
             smoothing_iterations=0, smoothing_factor=0.2))]
         #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
         pub fn $name(

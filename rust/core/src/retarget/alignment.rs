@@ -28,9 +28,8 @@ pub fn best_rotation(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> DMat3 {
     let mut best = *starts.iter().max_by(|a, b| score(a).total_cmp(&score(b))).expect("there are 24");
     for _ in 0..STEPS {
         let r = DMat3::from_quat(best);
-        let torque = r.x_axis.cross(covariance.x_axis)
-            + r.y_axis.cross(covariance.y_axis)
-            + r.z_axis.cross(covariance.z_axis);
+        let torque =
+            r.x_axis.cross(covariance.x_axis) + r.y_axis.cross(covariance.y_axis) + r.z_axis.cross(covariance.z_axis);
         let turn = torque / (score(&best).abs() + 1e-9);
         if turn.length() < 1e-14 {
             break;

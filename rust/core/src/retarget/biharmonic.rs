@@ -94,8 +94,11 @@ pub fn blends(source: &Described<'_>, target: &Described<'_>, landmarks: &[Landm
             .par_iter()
             .enumerate()
             .map(|(k, &i)| {
-                let near: Vec<&[u32]> =
-                    target.regions[i as usize].iter().filter_map(|r| candidates.get(*r as usize)).map(Vec::as_slice).collect();
+                let near: Vec<&[u32]> = target.regions[i as usize]
+                    .iter()
+                    .filter_map(|r| candidates.get(*r as usize))
+                    .map(Vec::as_slice)
+                    .collect();
                 source_rows.nearest(target_rows.row(k), &near)
             })
             .collect();
@@ -145,7 +148,8 @@ impl Descriptions {
         let vertices: Vec<u32> =
             (0..side.islands.len() as u32).filter(|&i| side.islands[i as usize] == island).collect();
         let row = |&i: &u32| {
-            let distances: Vec<f64> = landmarks.iter().map(|&j| side.embedding.distance(i as usize, j as usize)).collect();
+            let distances: Vec<f64> =
+                landmarks.iter().map(|&j| side.embedding.distance(i as usize, j as usize)).collect();
             let largest = distances.iter().fold(0.0f64, |most, &x| most.max(x)).max(f64::MIN_POSITIVE);
             let normal = side.normals[i as usize].to_array().map(|x| (ORIENTATION * f64::from(x)) as f32);
             distances.into_iter().map(move |d| (d / largest) as f32).chain(normal).collect::<Vec<f32>>()

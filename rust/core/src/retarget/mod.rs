@@ -16,6 +16,7 @@ mod rows;
 mod settings;
 mod shares;
 mod skeleton;
+mod smooth;
 mod warp;
 mod welded;
 
@@ -31,6 +32,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
 use prepared::Prepared;
+
+/// Vertices of one mesh that are closer than this share of its diagonal are one.
+const MERGE_DISTANCE: f64 = 1e-6;
 
 /// A character at rest: mesh and skeleton in one space.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +117,7 @@ pub fn retarget(
     stages.end("prepare");
     let placed = prepared.place(progress)?;
     stages.end("match");
-    let mut rows = prepared.rows_of_matches(&placed);
+    let mut rows = prepared.rows_of(&placed.matches);
     let mut report = prepared.report();
     if settings.method == Method::Biharmonic {
         (report.landmarks, report.by_landmarks) = prepared.replace_by_landmarks(&placed, &mut rows, progress)?;
@@ -122,9 +126,8 @@ pub fn retarget(
     let confidence = confidence::of_matches(&placed, &prepared.target, prepared.size, settings);
     let reliable: Vec<bool> =
         std::iter::zip(&confidence, &rows).map(|(&c, row)| c >= confidence::RELIABLE && !row.is_empty()).collect();
-    let rows = finish::filled(rows, &reliable, &prepared.target, progress)?;
-    stages.end("fill");
-    let weights = finish::weights(rows, &reliable, &prepared.target, target.skeleton.bones().len() as u32, settings);
+    let finish = finish::Finish::new(rows, &reliable, &prepared.target, target.mesh.diagonal())?;
+    let weights = finish.weights(target.skeleton.bones().len() as u32, settings, progress)?;
     stages.end("finish");
     progress.report(1.0);
     let of_vertex = || prepared.target.of_vertex.iter().map(|&u| u as usize);

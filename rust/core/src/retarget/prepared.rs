@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::biharmonic::{Described, blends, check_landmarks, landmarks_of_matches};
-use super::matching::{Match, Matching};
+use super::matching::{Lengths, Match, Matching};
 use super::registration::register;
-use super::rows::{Row, blended, of_vertices};
+use super::rows::{Row, blended};
 use super::shares::Shares;
 use super::skeleton::{BonePair, RestBone, pairs};
 use super::warp::Warp;
@@ -16,6 +16,11 @@ use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::weights::Weights;
+
+/// Length over which normals are smoothed, as a share of the source's diagonal.
+const NORMAL_SMOOTHING: f64 = 0.02;
+/// How far vertices follow the weights of their first match.
+const FOLLOW: f64 = 0.5;
 
 /// Everything that is known before the first vertex is matched.
 #[derive(Debug)]
@@ -39,7 +44,9 @@ pub(super) struct Prepared<'a> {
 #[derive(Debug)]
 pub(super) struct Placed {
     pub positions: Vec<DVec3>,
+    /// Smooth normals of both sides, in the source's pose.
     pub normals: Vec<Vec3>,
+    pub source_normals: Vec<Vec3>,
     pub matches: Vec<Match>,
 }
 
@@ -96,33 +103,39 @@ impl<'a> Prepared<'a> {
     pub fn place(&self, progress: &Progress) -> Result<Placed> {
         let triangles = self.characters[0].mesh.triangles();
         let points = self.settings.match_points;
-        let length = self.settings.normal_length * self.size;
-        let matching = Matching::new(&self.source, triangles, &self.target, points, length);
+        let lengths =
+            Lengths { normal: self.settings.normal_length * self.size, smoothing: NORMAL_SMOOTHING * self.size };
         let mut positions = self.warp.apply(&self.target.positions);
+        let matching = Matching::new(&self.source, triangles, &self.target, &positions, points, lengths)?;
+        progress.report(0.05);
+        progress.check()?;
+        self.follow_weights(&matching, &mut positions)?;
         progress.report(0.1);
         progress.check()?;
-        let iterations: usize = std::env::var("RT_ITER").ok().and_then(|x| x.parse().ok()).unwrap_or(0);
-        for _ in 0..iterations {
-            let matches = matching.closest(&positions);
-            let normals = Vec::new();
-            let rows = self.rows_of_matches(&Placed { positions: positions.clone(), normals, matches });
-            let mut place = vec![None; self.characters[1].skeleton.bones().len()];
-            self.guides.iter().enumerate().for_each(|(k, g)| place[g.target as usize] = Some(k));
-            positions = self.warp.apply_weighted(&self.target.positions, &rows, &place);
-        }
         if self.settings.registration {
             positions = register(&matching, &self.target.triangles, positions, self.size, progress)?;
         }
-        let normals = self.target.normals(&positions);
-        let matches = matching.closest(&positions);
+        let (matches, normals) = matching.closest(&positions)?;
         progress.report(0.7);
         progress.check()?;
-        Ok(Placed { positions, normals, matches })
+        let source_normals = matching.source_normals().to_vec();
+        Ok(Placed { positions, normals, source_normals, matches })
+    }
+
+    /// Moves each vertex halfway to where the weights of its match would carry it: the nearest bones change abruptly between
+    /// limbs, painted weights do not.
+    fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
+        let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);
+        let mut guide_of = vec![None; self.characters[1].skeleton.bones().len()];
+        (0..).zip(&self.guides).for_each(|(k, guide)| guide_of[guide.target as usize] = Some(k));
+        let carried = self.warp.apply_weighted(&self.target.positions, &rows, &guide_of);
+        positions.iter_mut().zip(carried).for_each(|(position, carried)| *position = position.lerp(carried, FOLLOW));
+        Ok(())
     }
 
     /// The weights of each match over the target's bones (U).
-    pub fn rows_of_matches(&self, placed: &Placed) -> Vec<Row> {
-        let corners = placed.matches.iter().map(|at| std::iter::zip(at.corners, at.barycentric));
+    pub fn rows_of(&self, matches: &[Match]) -> Vec<Row> {
+        let corners = matches.iter().map(|at| std::iter::zip(at.corners, at.barycentric));
         let row = |(blend, &position): (_, &DVec3)| blended(blend, self.weights, &self.shares, position);
         corners.zip(&self.target.positions).map(row).collect()
     }
@@ -141,8 +154,8 @@ impl<'a> Prepared<'a> {
         let [source_spectrum, target_spectrum] = spectra;
         let (source_spectrum, target_spectrum) = (source_spectrum?, target_spectrum?);
         let islands = [source, target].map(|c| Islands::new(c.mesh.triangles(), c.mesh.vertex_count()));
-        let source_normals = of_vertices(&self.source, &self.source.normals(&self.source.positions));
-        let target_normals = of_vertices(&self.target, &placed.normals);
+        let source_normals = self.source.spread(&placed.source_normals);
+        let target_normals = self.target.spread(&placed.normals);
         let regions = [(&self.source, 0), (&self.target, 1)].map(|(welded, side)| self.regions(welded, side));
         let blends = blends(
             &Described {
@@ -173,14 +186,13 @@ impl<'a> Prepared<'a> {
 
     /// Those of the artist, and one beside the head of each bone that guides.
     fn landmarks(&self, placed: &Placed) -> Vec<Landmark> {
-        let first = self.target.representatives();
         let head = |pair: &BonePair| self.characters[1].skeleton.bones()[pair.target as usize].head;
         let squared = |u: &usize, head: DVec3| self.target.positions[*u].distance_squared(head);
         let nearest = |head: DVec3| {
             (0..self.target.positions.len()).min_by(|a, b| squared(a, head).total_cmp(&squared(b, head))).unwrap_or(0)
         };
         let beside: Vec<usize> = self.guides.iter().map(|pair| nearest(head(pair))).collect();
-        let vertices: Vec<u32> = beside.iter().map(|&u| first[u]).collect();
+        let vertices: Vec<u32> = beside.iter().map(|&u| self.target.first[u]).collect();
         let matches: Vec<Match> = beside.iter().map(|&u| placed.matches[u]).collect();
         let mut landmarks = self.correspondence.landmarks.to_vec();
         landmarks.extend(landmarks_of_matches(&vertices, &matches));
@@ -204,7 +216,7 @@ impl<'a> Prepared<'a> {
             }
             best.map(|(_, k)| k)
         };
-        of_vertices(welded, &welded.positions.iter().map(nearest).collect::<Vec<_>>())
+        welded.spread(&welded.positions.iter().map(nearest).collect::<Vec<_>>())
     }
 }
 

@@ -3,11 +3,9 @@
 use glam::DVec3;
 
 use super::shares::Shares;
-use super::welded::Welded;
 use crate::weights::Weights;
 
-/// Bones and weights of one vertex, by bone.
-pub(super) type Row = Vec<(u32, f64)>;
+pub(super) use crate::fill::Row;
 
 /// The blend of some source vertices' normalised rows, in terms of the target's bones at `position`. Vertices without weight
 /// count for nothing; empty if all are.
@@ -42,9 +40,4 @@ pub(super) fn normalise(row: &mut Row) {
     row.retain(|&(_, value)| value > 0.0);
     let sum: f64 = row.iter().map(|&(_, value)| value).sum();
     row.iter_mut().for_each(|(_, value)| *value /= sum);
-}
-
-/// Values of distinct positions (U) for every vertex (V).
-pub(super) fn of_vertices<T: Copy>(welded: &Welded, values: &[T]) -> Vec<T> {
-    welded.of_vertex.iter().map(|&u| values[u as usize]).collect()
 }

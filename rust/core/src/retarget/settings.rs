@@ -26,7 +26,8 @@ pub struct Settings {
     pub method: Method,
     /// What a match may be.
     pub match_points: MatchPoints,
-    /// Whether the warped target is drawn onto the source by smooth displacements.
+    /// Whether the warped target is drawn onto the source by smooth displacements: for bodies of one maker with other
+    /// proportions, whose surfaces correspond. Where weights follow the bones more than the surface, it costs accuracy.
     pub registration: bool,
     /// How far apart normals that differ by a unit count, relative.
     pub normal_length: f64,
@@ -51,8 +52,8 @@ impl Default for Settings {
         Self {
             method: Method::default(),
             match_points: MatchPoints::default(),
-            registration: true,
-            normal_length: 0.03,
+            registration: false,
+            normal_length: 0.02,
             max_distance: 0.08,
             max_normal_angle: 80f64.to_radians(),
             max_stretch: 6.0,

@@ -51,7 +51,8 @@ impl<'a> Shares<'a> {
         }
         let distance = |&t: &u32| self.target.bones()[t as usize].distance(position);
         let nearest = heirs.iter().map(distance).fold(f64::INFINITY, f64::min);
-        let share = |t: &u32| if nearest > 0.0 { (nearest / distance(t)).powi(POWER) } else { f64::from(distance(t) == 0.0) };
+        let share =
+            |t: &u32| if nearest > 0.0 { (nearest / distance(t)).powi(POWER) } else { f64::from(distance(t) == 0.0) };
         let total: f64 = heirs.iter().map(share).sum();
         row.extend(heirs.iter().map(|t| (*t, weight * share(t) / total)));
     }

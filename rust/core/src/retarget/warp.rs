@@ -1,9 +1,10 @@
 //! The target brought into the source's rest pose and proportions, bone by bone.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::alignment::{best_rotation, swing};
+use super::rows::Row;
 use super::skeleton::{BonePair, RestBone, Skeleton};
 
 /// Bones that share in one vertex.
@@ -12,6 +13,9 @@ const NEAREST: usize = 3;
 const POWER: i32 = 4;
 /// Distance below which a bone does not gain any more, as a share of the mean bone length.
 const CLOSEST: f64 = 1e-3;
+
+/// Turn below which two characters face the same way, radians: less than that is a difference of pose.
+const SAME_FACING: f64 = 0.44;
 
 /// A vertex is carried by the nearest bones of the target: each moves it as its own frame moves into that of its partner,
 /// stretched along the bone by the ratio of the lengths and across by one ratio for the whole body.
@@ -37,7 +41,7 @@ impl Warp {
         let bones: Vec<(RestBone, RestBone)> =
             pairs.iter().map(|p| (source.bones()[p.source as usize], target.bones()[p.target as usize])).collect();
         let facing = facing(&bones);
-        let across = std::env::var("RT_ACROSS").ok().and_then(|x| x.parse().ok()).unwrap_or_else(|| size_ratio(&bones));
+        let across = size_ratio(&bones);
         let bone = |&(source, target): &(RestBone, RestBone)| BoneWarp {
             rotation: swing((facing * target.direction()).normalize(), source.direction()) * facing,
             along: source.length / target.length,
@@ -54,22 +58,20 @@ impl Warp {
         self.bones[0].across
     }
 
-    /// Where `positions` (V) would lie if each were moved by bones of these weights.
-    pub fn apply_weighted(&self, positions: &[DVec3], rows: &[Vec<(u32, f64)>], place: &[Option<usize>]) -> Vec<DVec3> {
-        positions
-            .par_iter()
-            .zip(rows)
-            .map(|(&p, row)| {
-                let (mut sum, mut total) = (DVec3::ZERO, 0.0);
-                for &(bone, w) in row {
-                    if let Some(k) = place[bone as usize] {
-                        sum += w * self.bones[k].apply(p);
-                        total += w;
-                    }
+    /// Where `positions` (V) would lie if each were moved by bones of these weights (V): the k-th guide's share is that of the
+    /// target's bone b with `guide_of[b] = k`. Vertices without a guide go with the nearest bones.
+    pub fn apply_weighted(&self, positions: &[DVec3], rows: &[Row], guide_of: &[Option<usize>]) -> Vec<DVec3> {
+        let carried = |(&position, row): (&DVec3, &Row)| {
+            let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+            for &(bone, share) in row {
+                if let Some(k) = guide_of[bone as usize] {
+                    sum += share * self.bones[k].apply(position);
+                    total += share;
                 }
-                if total > 0.0 { sum / total } else { self.apply_one(p) }
-            })
-            .collect()
+            }
+            if total > 0.0 { sum / total } else { self.apply_one(position) }
+        };
+        positions.par_iter().zip(rows).with_min_len(64).map(carried).collect()
     }
 
     /// Where `positions` (V) of the target would lie on the source.
@@ -120,8 +122,9 @@ fn facing(bones: &[(RestBone, RestBone)]) -> DMat3 {
     let (source, target): (Vec<DVec3>, Vec<DVec3>) =
         bones.iter().flat_map(|(source, target)| std::iter::zip(ends(source), ends(target))).unzip();
     let (source_centre, target_centre) = (centre(&source), centre(&target));
-    let r = best_rotation(std::iter::zip(target, source).map(|(t, s)| (t - target_centre, s - source_centre)));
-    if glam::DQuat::from_mat3(&r).to_axis_angle().1 < 0.44 { DMat3::IDENTITY } else { r }
+    let turn = best_rotation(std::iter::zip(target, source).map(|(t, s)| (t - target_centre, s - source_centre)));
+    let angle = DQuat::from_mat3(&turn).to_axis_angle().1;
+    if angle < SAME_FACING { DMat3::IDENTITY } else { turn }
 }
 
 /// Ratio of the summed lengths: a height would depend on how the character stands.

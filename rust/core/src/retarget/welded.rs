@@ -1,36 +1,38 @@
-//! A mesh whose vertices at equal positions are one, as its author saw it before an exporter cut it along seams.
-
-use std::collections::HashMap;
+//! A mesh whose coincident vertices are one, as its author saw it before an exporter cut it along seams.
 
 use glam::{DVec3, Vec3};
 
+use super::MERGE_DISTANCE;
 use crate::mesh::TriMesh;
+use crate::weld::Weld;
 
 /// Distinct positions of a mesh.
 #[derive(Debug)]
 pub struct Welded {
-    /// Distinct positions, in order of first appearance (U).
+    /// Distinct positions (U).
     pub positions: Vec<DVec3>,
     /// Which of them each vertex has, (V).
     pub of_vertex: Vec<u32>,
     /// Triangles over the distinct positions, as many as the mesh has (T).
     pub triangles: Vec<[u32; 3]>,
+    /// The first vertex at each distinct position, (U).
+    pub first: Vec<u32>,
 }
 
 impl Welded {
-    /// Finds the distinct positions, to the bit (but 0 and -0 are equal).
+    /// Unites vertices that are as close as the rounding of a file keeps equal ones apart.
     pub fn new(mesh: &TriMesh<'_>) -> Self {
-        let mut number = HashMap::with_capacity(mesh.vertex_count());
-        let mut positions = Vec::new();
-        let weld = |p: &[f32; 3]| {
-            *number.entry(p.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-                positions.push(Vec3::from(*p).as_dvec3());
-                positions.len() as u32 - 1
-            })
+        let weld = Weld::coincident(mesh.positions(), MERGE_DISTANCE * mesh.diagonal());
+        let (of_vertex, first): (Vec<u32>, Vec<u32>) = match &weld {
+            Some(weld) => (weld.class_of().to_vec(), weld.representatives().collect()),
+            None => (0..mesh.vertex_count() as u32).map(|i| (i, i)).unzip(),
         };
-        let of_vertex: Vec<u32> = mesh.positions().iter().map(weld).collect();
-        let triangles = mesh.triangles().iter().map(|t| t.map(|i| of_vertex[i as usize])).collect();
-        Self { positions, of_vertex, triangles }
+        Self {
+            positions: first.iter().map(|&i| mesh.position(i)).collect(),
+            triangles: mesh.triangles().iter().map(|t| t.map(|i| of_vertex[i as usize])).collect(),
+            of_vertex,
+            first,
+        }
     }
 
     /// Area-weighted unit normals at `positions` (U), zero where there is no direction.
@@ -44,12 +46,8 @@ impl Welded {
         normals.iter().map(|n| n.normalize_or_zero().as_vec3()).collect()
     }
 
-    /// The first vertex at each distinct position, (U).
-    pub fn representatives(&self) -> Vec<u32> {
-        let mut first = vec![u32::MAX; self.positions.len()];
-        for (i, &u) in self.of_vertex.iter().enumerate().rev() {
-            first[u as usize] = i as u32;
-        }
-        first
+    /// Values of distinct positions (U) for every vertex (V).
+    pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        self.of_vertex.iter().map(|&u| values[u as usize]).collect()
     }
 }

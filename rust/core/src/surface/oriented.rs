@@ -243,7 +243,8 @@ mod tests {
             let query = lift(2.0 * point(9 * k + 6), point(9 * k + 7), 0.5);
             let (squared, barycentric) = closest_in_triangle(&query, &corners);
             assert!(barycentric.iter().all(|&x| x >= 0.0) && (barycentric.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            let grid = (0..=60).flat_map(|i| (0..=60 - i).map(move |j| [i, j, 60 - i - j].map(|x| f64::from(x) / 60.0)));
+            let grid =
+                (0..=60).flat_map(|i| (0..=60 - i).map(move |j| [i, j, 60 - i - j].map(|x| f64::from(x) / 60.0)));
             let [a, b, c] = &corners;
             let sampled = grid.map(|at| measured(&query, [a, b, c], at).0).fold(f64::INFINITY, f64::min);
             assert!(squared <= sampled + 1e-12 && sampled < squared + 0.2, "{squared} {sampled}");
