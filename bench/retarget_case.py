@@ -133,7 +133,9 @@ class Ruler:
     def __init__(self, source: Character) -> None:
         self.source = source
         triangles = source.triangles
-        edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0)
+        edges = np.unique(
+            np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0
+        )
         length = np.linalg.norm(source.positions[edges[:, 0]] - source.positions[edges[:, 1]], axis=1)
         ends = (np.r_[edges[:, 0], edges[:, 1]], np.r_[edges[:, 1], edges[:, 0]])
         self._graph = sp.csr_matrix((np.r_[length, length], ends), shape=[len(source.positions)] * 2)

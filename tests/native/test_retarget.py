@@ -43,7 +43,13 @@ def tube(around=16, along=24, length=4.0, radius=0.4, bend=0.0):
         pose[j, :3, :3], pose[j, :3, 3] = turn, head - turn @ head
         pose[j] = pose[j - 1] @ pose[j]
     return Character(
-        characters.skinned(positions, weights, pose), body.triangles, weights, body.names, body.parents, pose @ frames, body.lengths
+        characters.skinned(positions, weights, pose),
+        body.triangles,
+        weights,
+        body.names,
+        body.parents,
+        pose @ frames,
+        body.lengths,
     )
 
 
@@ -93,7 +99,9 @@ def test_truncation_converges(native):
     full = native.biharmonic_embedding(body.positions, body.triangles, n_pairs=len(body.positions) - 1)
     wanted = distances(full, [0, 200])
     errors = [
-        np.abs(distances(native.biharmonic_embedding(body.positions, body.triangles, n_pairs=n), [0, 200]) - wanted).max()
+        np.abs(
+            distances(native.biharmonic_embedding(body.positions, body.triangles, n_pairs=n), [0, 200]) - wanted
+        ).max()
         for n in (10, 50, 150)
     ]
     assert errors[0] > errors[1] > errors[2]

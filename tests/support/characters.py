@@ -127,7 +127,13 @@ def gltf_character(path: Path) -> Character:
     total = weights.sum(1, keepdims=True)
     lengths = _lengths(parents, frames)
     return Character(
-        body.positions.astype(float), body.triangles, weights / np.where(total > 0, total, 1), names, parents, frames, lengths
+        body.positions.astype(float),
+        body.triangles,
+        weights / np.where(total > 0, total, 1),
+        names,
+        parents,
+        frames,
+        lengths,
     )
 
 

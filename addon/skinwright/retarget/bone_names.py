@@ -73,9 +73,7 @@ CONVENTIONS: dict[str, tuple[dict[str, str], str, str]] = {
     ),
     "Character Creator": (
         _trunk(*(f"CC_Base_{n}" for n in "Pelvis Waist Spine01 Spine02 NeckTwist01 Head".split()))
-        | _limbs(
-            *(f"CC_Base_{{S}}_{n}" for n in "Clavicle Upperarm Forearm Hand Thigh Calf Foot ToeBase".split())
-        )
+        | _limbs(*(f"CC_Base_{{S}}_{n}" for n in "Clavicle Upperarm Forearm Hand Thigh Calf Foot ToeBase".split()))
         | _fingers("CC_Base_{S}_{name}{joint}", ("Thumb", "Index", "Mid", "Ring", "Pinky")),
         "L",
         "R",
@@ -115,7 +113,7 @@ def plain(name: str) -> str:
 
 
 def side(name: str) -> str:
-    """"L", "R", or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
+    """ "L", "R", or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
     bare = _PREFIX.sub("", unicodedata.normalize("NFKC", name))
     if bare[:1] in "左右":
         return _SIDES[bare[0]]

@@ -160,7 +160,7 @@ fn wait(py: Python<'_>, threads: usize, inputs: Inputs) -> PyResult<Retarget> {
 
 fn start(_: Python<'_>, threads: usize, inputs: Inputs) -> PyResult<Job> {
     let present = |py: Python<'_>, result| Ok(Py::new(py, present(py, result)?)?.into_any());
-    Ok(Job::start(threads, move |progress| inputs.run(progress), present))
+    Job::start(threads, move |progress| inputs.run(progress), present)
 }
 
 fn present(py: Python<'_>, result: core::Retarget) -> PyResult<Retarget> {
