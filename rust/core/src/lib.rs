@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod biharmonic;
 pub mod desparsify;
 pub mod error;
 pub mod fill;
@@ -15,6 +16,7 @@ pub mod mesh;
 pub mod penetration;
 pub mod progress;
 pub mod refine;
+pub mod retarget;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;

@@ -1,6 +1,7 @@
 //! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
+mod biharmonic;
 mod desparsify;
 mod error;
 mod fill;
@@ -10,6 +11,7 @@ mod memory;
 mod penetration;
 mod ranges;
 mod refine;
+mod retarget;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -22,6 +24,8 @@ use pyo3::prelude::*;
 /// Skinwright's numerics.
 #[pymodule]
 mod skinwright_native {
+    #[pymodule_export]
+    use crate::biharmonic::biharmonic_embedding;
     #[pymodule_export]
     use crate::desparsify::desparsify;
     #[pymodule_export]
@@ -40,6 +44,8 @@ mod skinwright_native {
     use crate::penetration::penetration;
     #[pymodule_export]
     use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
+    use crate::retarget::{Retarget, retarget_weights, start_retarget_weights};
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
