@@ -125,7 +125,8 @@ class Job:
     @property
     def done(self) -> bool: ...
     def cancel(self) -> None: ...
-    def result(self) -> Transfer: ...
+    def result(self) -> Any:
+        """Waits for what the function that started the job returns, or raises its error. May be called again."""
 
 def transfer_weights(
     source_positions: ArrayLike,
@@ -280,3 +281,50 @@ class SculptSolver:
 def simplex_qp(h: ArrayLike, g: ArrayLike, start: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
     """Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for P problems of N <= 12 unknowns at once: the
     solver inside of a stroke. `h` (P, N, N) symmetric positive definite, `g` and `start` (P, N), starts feasible."""
+
+@final
+class AutoWeights:
+    """Automatic weights: one row per vertex, none empty, each summing to 1."""
+
+    @property
+    def weights(self) -> Weights: ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
+        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
+        `seconds` by stage."""
+
+def automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> AutoWeights:
+    """Computes weights for the bones of an armature from scratch. Any mesh gets an answer at every vertex: open,
+    overlapping, of many islands, split at seams (coincident vertices get equal rows).
+
+    `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
+    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
+    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
+    """
+
+def start_automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> Job:
+    """The same as a job, whose result is an `AutoWeights`."""

@@ -90,6 +90,12 @@ pub enum Error {
         /// A vertex of the offending block.
         vertex: usize,
     },
+    /// Bones that cannot be used.
+    #[error("the skeleton cannot be used: {reason}")]
+    InvalidSkeleton {
+        /// What is wrong, and what to do about it.
+        reason: String,
+    },
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -6,7 +6,9 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
 pub mod inside;
 pub mod laplacian;

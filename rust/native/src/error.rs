@@ -31,7 +31,9 @@ pub fn to_python(error: Error) -> PyErr {
         Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {
             InvalidWeights::new_err(sentence)
         }
-        Error::LengthMismatch { .. } | Error::InvalidParameter { .. } => InvalidParameter::new_err(sentence),
+        Error::LengthMismatch { .. } | Error::InvalidParameter { .. } | Error::InvalidSkeleton { .. } => {
+            InvalidParameter::new_err(sentence)
+        }
         Error::NotPositiveDefinite { .. } => NotSolvable::new_err(sentence),
         Error::Cancelled => Cancelled::new_err(sentence),
     }

@@ -1,6 +1,7 @@
 //! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
+mod autoskin;
 mod desparsify;
 mod error;
 mod inpainting;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 /// Skinwright's numerics.
 #[pymodule]
 mod skinwright_native {
+    #[pymodule_export]
+    use crate::autoskin::{AutoWeights, automatic_weights, start_automatic_weights};
     #[pymodule_export]
     use crate::desparsify::desparsify;
     #[pymodule_export]
