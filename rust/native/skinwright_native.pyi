@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
 
 def version() -> str: ...
+def set_memory_budget(bytes: int | None) -> None:
+    """Bytes that one piece of work may take, None for whatever the machine has; what would take more is refused with a
+    MemoryError that states the estimate."""
 
 class SkinwrightError(ValueError): ...
 class NothingMatched(SkinwrightError): ...
@@ -148,6 +151,25 @@ def transfer_weights(
     island_policy: IslandPolicy = "bridge",
     threads: int = 0,
 ) -> Transfer: ...
+def fill(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    kinds: ArrayLike,
+    rows: ArrayLike,
+    *,
+    confidence: ArrayLike | None = None,
+    length: float = 0.0,
+    weld: ArrayLike | None = None,
+    threads: int = 0,
+) -> NDArray[np.float64]:
+    """Values at all vertices (V, C) from values at some: minimises, summed over the columns,
+    w'(S + length^2 S M^-1 S)w plus b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
+
+    `positions` (V, 3), `triangles` (T, 3); `kinds` (V,): 0 free, 1 fixed, 2 soft; `rows` (V, C): the known values;
+    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution;
+    `weld` (V,): for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
+    """
+
 def linear_blend(
     rest_positions: ArrayLike, weights: Weights, pose_from_rest: ArrayLike, *, threads: int = 0
 ) -> NDArray[np.float32]:
@@ -156,6 +178,22 @@ def linear_blend(
     `rest_positions` (V, 3) and `pose_from_rest` (B, 4, 4) row-major are in the mesh' own space; for Blender,
     pose_from_rest = object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world. The sum of the matrices
     times the weights is divided by the weights' sum; a vertex whose weights sum to no more than 0.0001 stays.
+    """
+
+def penetration(
+    body_positions: ArrayLike,
+    body_triangles: ArrayLike,
+    body_weights: Weights,
+    positions: ArrayLike,
+    weights: Weights,
+    pose_from_rest: ArrayLike,
+    *,
+    threads: int = 0,
+) -> NDArray[np.float32]:
+    """Depths (P, n) of a garment's vertices (n) below the closest triangle of a body, 0 outside, in each of P poses.
+
+    `body_positions` (V, 3) and `positions` (n, 3) are at rest, in world units; `body_triangles` (T, 3) wind so that
+    their normals face outward. `pose_from_rest` (P * B, 4, 4) has the B bones' matrices, one pose after the other.
     """
 
 def desparsify(
@@ -328,3 +366,53 @@ def start_automatic_weights(
     threads: int = 0,
 ) -> Job:
     """The same as a job, whose result is an `AutoWeights`."""
+
+@final
+class Embedding:
+    """A skeleton embedded into a mesh, bone by bone."""
+
+    @property
+    def heads(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def tails(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """(B,): how far to trust each bone's head, 0 to 1."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
+        are outside of the mesh), `penalty`, `seconds`."""
+
+def embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial"] = "medial",
+    threads: int = 0,
+) -> Embedding:
+    """Puts the bones of a template into a mesh that has none.
+
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
+    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
+    needs the shape of the mesh only.
+    """
+
+def start_embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial"] = "medial",
+    threads: int = 0,
+) -> Job:
+    """The same as a job, whose result is an `Embedding`."""

@@ -80,7 +80,7 @@ pub fn start_automatic_weights(
     let settings = settings(method, max_influences, resolution, stiffness)?;
     let input = Arc::new(input(&positions, &triangles, &bone_segments, &bone_parents, settings)?);
     let work = move |progress: &Progress| input.run(progress);
-    Ok(Job::start(threads, work, |py, result| Ok(Py::new(py, present(py, result)?)?.into_any())))
+    Job::start(threads, work, |py, result| Ok(Py::new(py, present(py, result)?)?.into_any()))
 }
 
 fn settings(method: &str, max_influences: usize, resolution: f64, stiffness: f64) -> PyResult<Settings> {

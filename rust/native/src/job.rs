@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use pyo3::prelude::*;
 use skinwright_core::Progress;
 
-use crate::error::{Outcome, finish, run};
+use crate::error::{Outcome, SkinwrightError, finish, run};
 
 /// Turns what the core returned into what Python gets.
 type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
@@ -26,21 +26,22 @@ impl Job {
         threads: usize,
         work: impl FnOnce(&Progress) -> skinwright_core::Result<T> + Send + 'static,
         present: impl FnOnce(Python<'_>, T) -> PyResult<Py<PyAny>> + Send + 'static,
-    ) -> Self {
+    ) -> PyResult<Self> {
         let progress = Arc::new(Progress::default());
         let seen = Arc::clone(&progress);
         let presented = move |seen: &Progress| {
             let result = work(seen)?;
             Ok(Box::new(move |py: Python<'_>| present(py, result)) as Present)
         };
-        let thread = std::thread::spawn(move || run(threads, move || presented(&seen)));
-        Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() }
+        let thread = std::thread::Builder::new().spawn(move || run(threads, move || presented(&seen)));
+        let thread = thread.map_err(|error| SkinwrightError::new_err(format!("no thread can be started: {error}")))?;
+        Ok(Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() })
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let thread = self.thread.lock().expect("never poisoned").take();
         let Some(thread) = thread else {
-            return Err(crate::error::SkinwrightError::new_err("another thread is waiting for this job"));
+            return Err(SkinwrightError::new_err("another thread is waiting for this job"));
         };
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
         finish(outcome)?(py)

@@ -3,9 +3,15 @@
 mod arrays;
 mod autoskin;
 mod desparsify;
+mod embed;
 mod error;
+mod fill;
 mod inpainting;
 mod job;
+mod memory;
+mod penetration;
+mod ranges;
+mod refine;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -23,17 +29,27 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::desparsify::desparsify;
     #[pymodule_export]
+    use crate::embed::{Embedding, embed_skeleton, start_embed_skeleton};
+    #[pymodule_export]
     use crate::error::{
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
     };
+    #[pymodule_export]
+    use crate::fill::fill;
     #[pymodule_export]
     use crate::inpainting::Inpainting;
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]
+    use crate::memory::set_memory_budget;
+    #[pymodule_export]
+    use crate::penetration::penetration;
+    #[pymodule_export]
+    use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
-    use crate::skinning::linear_blend;
+    use crate::skinning::{dual_quaternion_blend, linear_blend};
     #[pymodule_export]
     use crate::source::{Source, transfer_weights};
     #[pymodule_export]

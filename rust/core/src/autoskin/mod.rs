@@ -91,8 +91,9 @@ pub fn automatic_weights(
     skeleton.check(mesh)?;
     let mut clock = Clock::default();
     let welded = Welded::new(mesh);
+    let vertices = mesh.vertex_count();
     let mesh = TriMesh::new(&welded.positions, &welded.triangles, "rest")?;
-    let mut report = Report { vertices: welded.vertex_of.len(), distinct: welded.positions.len(), ..Report::default() };
+    let mut report = Report { vertices, distinct: welded.positions.len(), ..Report::default() };
     let weights = match settings.method {
         Method::Euclidean => inverse_distance::euclidean(&mesh, skeleton),
         method => {
@@ -105,7 +106,7 @@ pub fn automatic_weights(
         }
     };
     clock.lap("weights", &mut report);
-    let weights = welded.spread(&limit::limit(&weights, settings.max_influences));
+    let weights = welded.spread(limit::limit(&weights, settings.max_influences));
     report.count(&weights);
     progress.report(1.0);
     Ok(AutoWeights { weights, report })
