@@ -6,8 +6,10 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
 pub mod biharmonic;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
 pub mod fill;
 pub mod inside;
