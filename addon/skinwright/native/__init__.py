@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import memory
 from ..csr import Rows
+from ..errors import Refused
 
 _module: Any = None
 _import_error = ""
@@ -22,7 +24,7 @@ except ImportError as error:
     _import_error = str(error)
 
 
-class NativeError(ValueError):
+class NativeError(Refused):
     """What the native module answers to inputs it has no answer for: one sentence."""
 
 
@@ -44,6 +46,16 @@ def problem() -> str:
 def addon_version() -> str:
     """The version in the manifest."""
     return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
+
+
+# The part of the free memory that one piece of work may take; the preferences set it.
+memory_share = 0.5
+
+
+def _set_budget() -> None:
+    """Before each piece of work, as what is free changes."""
+    free = memory.free_bytes()
+    _module.set_memory_budget(None if free is None else int(free * memory_share))
 
 
 class Source:
@@ -103,10 +115,95 @@ class Job:
         return transfer, _rows(transfer.weights)
 
 
+def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
+    """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
+
+    Characters are positions, triangles, frames and lengths; `rows` are the source's over its bones.
+    """
+    positions, triangles, frames, lengths = source
+    with _naming(name):
+        weights = _module.Weights(*rows, len(lengths))
+        arrays = (positions, triangles, weights, frames, lengths, *target)
+        return Job(name, _module.start_retarget_weights(*arrays, **options))
+
+
+class Refiner:
+    """A character prepared for refinement; keyword arguments as in the stub."""
+
+    def __init__(
+        self,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        rows: Rows,
+        n_bones: int,
+        parents: NDArray,
+        segments: NDArray,
+        **options: Any,
+    ) -> None:
+        self.name = name
+        with _naming(name):
+            weights = _module.Weights(*rows, n_bones)
+            self._refiner = _module.Refiner(positions, triangles, weights, parents, segments, **options)
+
+    def solve(self, pose_from_rest: NDArray, quality: str = "live") -> NDArray[np.float32]:
+        """(V, 3) of a pose (B, 4, 4)."""
+        with _naming(self.name):
+            return self._refiner.solve(pose_from_rest, quality=quality)
+
+    def measure(self, pose_from_rest: NDArray, positions: NDArray) -> dict[str, Any]:
+        """Pairs, and volume and bulge of each joint, for positions (V, 3) in a pose."""
+        with _naming(self.name):
+            return self._refiner.measure(pose_from_rest, positions)
+
+
+def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: NDArray | None) -> NDArray[np.float32]:
+    """(V, 3) as Blender's Armature modifier poses them: linearly, or with Preserve Volume if rest matrices are given."""
+    weights = _module.Weights(*rows, len(pose_from_rest))
+    if rest_bones is None:
+        return _module.linear_blend(positions, weights, pose_from_rest)
+    return _module.dual_quaternion_blend(positions, weights, pose_from_rest, rest_bones=rest_bones)
+
+
+def closest(
+    name: str, positions: NDArray, triangles: NDArray, rows: Rows, n_bones: int, queries: NDArray
+) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]:
+    """Triangle (n,), distance (n,) and barycentric shares (n, 3) of the point of a surface nearest to each query (n, 3)."""
+    with _naming(name):
+        source = _module.Source(positions, triangles, _module.Weights(*rows, n_bones))
+        return source.closest_points(queries)
+
+
 def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
     """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
     with _naming(name):
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
+
+
+def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:
+    """(V, 3) where linear blend skinning takes rest positions (V, 3) by matrices (B, 4, 4), all in one space."""
+    with _naming(name):
+        return _module.linear_blend(rest, _module.Weights(*rows, len(pose_from_rest)), pose_from_rest)
+
+
+def penetration(
+    name: str,
+    body: tuple[NDArray, NDArray, Rows],
+    garment: tuple[NDArray, Rows],
+    poses: NDArray,
+) -> NDArray[np.float32]:
+    """(P, n) depths of a garment's vertices inside a body in poses (P, B, 4, 4); arguments as in the stub."""
+    n_bones = poses.shape[1]
+    (positions, triangles, rows), (points, point_rows) = body, garment
+    with _naming(name):
+        return _module.penetration(
+            positions,
+            triangles,
+            _module.Weights(*rows, n_bones),
+            points,
+            _module.Weights(*point_rows, n_bones),
+            poses.reshape(-1, 4, 4),
+        )
 
 
 class SculptSolver:
@@ -150,15 +247,18 @@ class SculptSolver:
 
     def undo(self) -> NDArray[np.uint32] | None:
         """Takes the last stroke back; the vertices it had touched."""
-        return self._solver.undo()
+        with _naming(self.name):
+            return self._solver.undo()
 
     def redo(self) -> NDArray[np.uint32] | None:
         """Does it again; likewise."""
-        return self._solver.redo()
+        with _naming(self.name):
+            return self._solver.redo()
 
     def rows(self, vertices: NDArray | None = None) -> Rows:
         """The present rows of these vertices, or of all."""
-        return _rows(self._solver.weights(vertices))
+        with _naming(self.name):
+            return _rows(self._solver.weights(vertices))
 
     @property
     def stroke_count(self) -> int:
@@ -172,7 +272,8 @@ class SculptSolver:
 
     def rest_residuals(self, pose: int) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """The vertices (n,) sculpted in a pose, and the offsets (n, 3) at rest that weights cannot stand in for."""
-        return self._solver.rest_residuals(pose=pose)
+        with _naming(self.name):
+            return self._solver.rest_residuals(pose=pose)
 
 
 def _rows(weights: Any) -> Rows:
@@ -181,7 +282,13 @@ def _rows(weights: Any) -> Rows:
 
 @contextmanager
 def _naming(name: str) -> Iterator[None]:
+    """What the module raises, a panic of Rust included, as one class whose sentence names the object."""
+    _set_budget()
     try:
         yield
-    except _module.SkinwrightError as error:
+    except (_module.SkinwrightError, MemoryError, OverflowError, RuntimeError) as error:
         raise NativeError(f"{name}: {error}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise NativeError(f"{name}: internal error in Skinwright, please report it: {error}") from error

@@ -1,6 +1,30 @@
 """Operators, one file or folder per feature."""
 
-from . import check_weights, desparsify, match, presets, sculpt, transfer_weights
-from .modal import timers
+from . import (
+    bone_map,
+    check_weights,
+    desparsify,
+    match,
+    presets,
+    retarget_weights,
+    sculpt,
+    stored_weights,
+    transfer_weights,
+)
+from .modal import keep_alive, timers, undo
 
-MODULES = (timers, transfer_weights, presets, *match.MODULES, check_weights, desparsify, *sculpt.MODULES)
+MODULES = (
+    timers,
+    keep_alive,
+    undo,
+    transfer_weights,
+    presets,
+    *match.MODULES,
+    check_weights,
+    desparsify,
+    *sculpt.MODULES,
+    *refine.MODULES,
+    stored_weights,
+    retarget_weights,
+    bone_map,
+)

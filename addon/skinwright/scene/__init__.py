@@ -1,6 +1,21 @@
 """The only code that touches Blender's data: numpy arrays out, numpy arrays in."""
 
-from . import armature, attributes, changes, corrective, deformation, depth, error, mask, mesh, poses, rest_shape, sculpting, vertex_groups
+from . import (
+    armature,
+    attributes,
+    changes,
+    corrective,
+    deformation,
+    depth,
+    error,
+    mask,
+    mesh,
+    poses,
+    rest_bones,
+    rest_shape,
+    sculpting,
+    vertex_groups,
+)
 
 __all__ = [
     "armature",
@@ -13,6 +28,7 @@ __all__ = [
     "mask",
     "mesh",
     "poses",
+    "rest_bones",
     "rest_shape",
     "sculpting",
     "vertex_groups",

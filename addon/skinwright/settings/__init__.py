@@ -5,11 +5,13 @@ from bpy.props import PointerProperty
 from bpy.types import Object, PropertyGroup, Scene
 
 from .overlay import SKINWRIGHT_PG_overlay
+from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
+from .refine import SKINWRIGHT_PG_refine
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
-from .transfer import SKINWRIGHT_PG_transfer, TransferOptions
+from .transfer import SKINWRIGHT_PG_transfer, TransferSettings
 
-__all__ = ["CLASSES", "TransferOptions", "register", "unregister"]
+__all__ = ["CLASSES", "TransferSettings", "register", "unregister"]
 
 
 class SKINWRIGHT_PG_scene(PropertyGroup):
@@ -18,6 +20,8 @@ class SKINWRIGHT_PG_scene(PropertyGroup):
     transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
     overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
     sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
+    refine: PointerProperty(type=SKINWRIGHT_PG_refine)
+    retarget: PointerProperty(type=SKINWRIGHT_PG_retarget)
 
 
 CLASSES = (
@@ -25,6 +29,8 @@ CLASSES = (
     SKINWRIGHT_PG_object,
     SKINWRIGHT_PG_overlay,
     SKINWRIGHT_PG_sculpt,
+    SKINWRIGHT_PG_bone_pair,
+    SKINWRIGHT_PG_retarget,
     SKINWRIGHT_PG_scene,
 )
 

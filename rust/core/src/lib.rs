@@ -6,20 +6,28 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
+pub mod biharmonic;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
+pub mod fill;
 pub mod inside;
 pub mod laplacian;
 pub mod mesh;
+pub mod penetration;
 pub mod progress;
 pub mod refine;
+pub mod retarget;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;
 pub mod transfer;
 pub mod weights;
+pub mod weld;
 
 pub use error::{Error, Result};
 pub use mesh::TriMesh;
 pub use progress::Progress;
 pub use weights::Weights;
+pub use weld::Weld;

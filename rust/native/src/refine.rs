@@ -25,11 +25,7 @@ pub struct Refiner {
 
 impl Refiner {
     /// Runs `work` with the GIL freed, on the kept pool: starting threads takes longer than a stage of a frame.
-    fn enter<T: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce() -> skinwright_core::Result<T> + Send,
-    ) -> PyResult<T> {
+    fn enter<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> PyResult<T> {
         match &self.pool {
             Some(pool) => enter(py, 0, || pool.install(work)),
             None => enter(py, 0, work),

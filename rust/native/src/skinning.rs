@@ -1,16 +1,15 @@
 //! `linear_blend`, and bone matrices from NumPy.
 
 use glam::DAffine3;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use skinwright_core::skinning as core;
 
+pub use crate::arrays::Stack;
 use crate::arrays::{Matrix, triples};
 use crate::error::{InvalidParameter, enter, to_python};
+use crate::ranges;
 use crate::weights::Weights;
-
-/// A 3-D argument of any number type.
-pub type Stack<'py, T> = PyArrayLike3<'py, T, AllowTypeChange>;
 
 /// One transform a bone from (B, 4, 4) row-major matrices.
 pub fn pose(matrices: &Stack<'_, f64>) -> PyResult<Vec<DAffine3>> {
@@ -39,7 +38,7 @@ pub fn linear_blend<'py>(
     rest_positions: Matrix<'py, f32>,
     weights: &Weights,
     pose_from_rest: Stack<'py, f64>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (rest, pose) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
     let weights = weights.to_core(py)?;

@@ -65,8 +65,7 @@ impl Joint {
         let parent = skeleton.parent(bone)?;
         let family = family(skeleton, bone, parent, of_bone);
         let head = skeleton.segments[bone][0];
-        let skin: Vec<DVec3> =
-            family.iter().filter(|&&p| p as usize >= nodes).map(|&p| places[p as usize]).collect();
+        let skin: Vec<DVec3> = family.iter().filter(|&&p| p as usize >= nodes).map(|&p| places[p as usize]).collect();
         let nearest = skin.iter().map(|p| p.distance(head)).min_by(f64::total_cmp)?;
         let mut radius = nearest;
         let mut axis = directions(skeleton, bone, parent, 0.0)?;
@@ -143,14 +142,7 @@ fn members(family: &[u32], places: &[DVec3], axis: &Axis, radius: f64) -> Vec<Me
 }
 
 /// Both bones are longer than the limb is thick, and the skin around the joint lies at about one distance from them.
-fn is_limb(
-    skeleton: &Skeleton,
-    bone: usize,
-    parent: usize,
-    axis: &Axis,
-    skin: &[DVec3],
-    radius: f64,
-) -> bool {
+fn is_limb(skeleton: &Skeleton, bone: usize, parent: usize, axis: &Axis, skin: &[DVec3], radius: f64) -> bool {
     let head = skeleton.segments[bone][0];
     let length = skeleton.segments[bone][1].distance(head);
     let above = skeleton.segments[parent][0].distance(head);

@@ -110,11 +110,7 @@ impl Local {
                 |k| lattice.tetrahedra[k as usize].map(map),
                 |_| prepared.tetrahedron_volume,
             ),
-            energy: Batch::new(
-                &tetrahedra,
-                |k| lattice.tetrahedra[k as usize].map(map),
-                |k| prepared.arms[k as usize],
-            ),
+            energy: Batch::new(&tetrahedra, |k| lattice.tetrahedra[k as usize].map(map), |k| prepared.arms[k as usize]),
             hung: hung.collect(),
             free: active.iter().map(|joint| members(&mut joint.free())).collect(),
             beyond: active.iter().map(|joint| members(&mut joint.beyond())).collect(),

@@ -107,21 +107,15 @@ impl Refiner {
     ///
     /// # Errors
     /// [`crate::Error::LengthMismatch`] if positions or bones are of another number.
-    pub fn measure(
-        &self,
-        pose_from_rest: &[DAffine3],
-        positions: &[[f32; 3]],
-    ) -> Result<(usize, Vec<JointMeasure>)> {
+    pub fn measure(&self, pose_from_rest: &[DAffine3], positions: &[[f32; 3]]) -> Result<(usize, Vec<JointMeasure>)> {
         check_length("positions", positions.len(), self.rest_positions.len())?;
         check_length("pose_from_rest", pose_from_rest.len(), self.weights.n_bones() as usize)?;
         let surface = &self.prepared.surface;
         let welded: Vec<[f32; 3]> = surface.source.iter().map(|&i| positions[i as usize]).collect();
-        let in_cells = |&place: &[f32; 3]| {
-            ((Vec3::from(place).as_dvec3() - self.prepared.middle) / self.prepared.cell).as_vec3()
-        };
+        let in_cells =
+            |&place: &[f32; 3]| ((Vec3::from(place).as_dvec3() - self.prepared.middle) / self.prepared.cell).as_vec3();
         let places: Vec<Vec3> = welded.iter().map(in_cells).collect();
-        let joints =
-            solver::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
+        let joints = solver::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
         Ok((intersecting_pairs(&welded, &surface.triangles).len(), joints))
     }
 

@@ -45,8 +45,7 @@ pub(super) fn intersecting_pairs_of(
         let meets = near.filter(|o| intersect(at, corners, triangles[o.triangle as usize]));
         meets.map(|o| [one.triangle.min(o.triangle), one.triangle.max(o.triangle)]).collect::<Vec<_>>()
     };
-    let mut pairs: Vec<[u32; 2]> =
-        (0..boxes.len()).into_par_iter().with_min_len(RUN).flat_map_iter(of_one).collect();
+    let mut pairs: Vec<[u32; 2]> = (0..boxes.len()).into_par_iter().with_min_len(RUN).flat_map_iter(of_one).collect();
     pairs.sort_unstable();
     pairs
 }

@@ -353,18 +353,10 @@ impl Frame<'_> {
         (if target == 0.0 { 0.0 } else { volume / target - 1.0 }, bulge)
     }
 
-    fn joint_report(
-        &self,
-        k: usize,
-        path: &Path<'_>,
-        pose: &[DAffine3],
-        axis: &Axis,
-        before: &[Vec3],
-    ) -> JointReport {
+    fn joint_report(&self, k: usize, path: &Path<'_>, pose: &[DAffine3], axis: &Axis, before: &[Vec3]) -> JointReport {
         let joint = self.active[k].joint;
         let (volume_before, bulge_before) = self.measure(k, pose, axis, &|p| before[p as usize]);
-        let (volume_after, bulge_after) =
-            self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
+        let (volume_after, bulge_after) = self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
         let (angle, is_limb) = (path.angle(joint.bone), joint.is_limb);
         JointReport { bone: joint.bone, angle, volume_before, volume_after, bulge_before, bulge_after, is_limb }
     }

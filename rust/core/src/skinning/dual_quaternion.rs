@@ -35,10 +35,8 @@ impl DualQuaternion {
             return Self::rigid(DQuat::from_mat3(&transform.matrix3), transform.translation, None);
         }
         let turned = DAffine3 { matrix3: orthogonal_to_y(&axes), translation: posed.translation };
-        let turned = DAffine3 {
-            matrix3: DMat3::from_quat(DQuat::from_mat3(&turned.matrix3)),
-            translation: turned.translation,
-        };
+        let turned =
+            DAffine3 { matrix3: DMat3::from_quat(DQuat::from_mat3(&turned.matrix3)), translation: turned.translation };
         let (rest_inverse, turned_inverse) = (rest.inverse(), turned.inverse());
         let rotation = turned * rest_inverse;
         let scale = *rest * (turned_inverse * posed) * rest_inverse;

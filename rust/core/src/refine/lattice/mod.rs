@@ -129,16 +129,17 @@ fn elements(
 
 /// Whether a corner or the centre of any crossed tetrahedron is inside: thin limbs may have no more.
 fn anything_inside(elements: &[Element], inside: &(dyn Fn(DVec3) -> bool + Sync)) -> bool {
-    elements.par_iter().any(|e| {
-        inside(e.tetrahedron.centre()) || e.tetrahedron.corners().iter().any(|&corner| inside(place(corner)))
-    })
+    elements
+        .par_iter()
+        .any(|e| inside(e.tetrahedron.centre()) || e.tetrahedron.corners().iter().any(|&corner| inside(place(corner))))
 }
 
 /// Numbers the nodes along a Morton curve, so that neighbours lie together in memory.
 fn number(elements: &[Element], sets: &mut crate::adjacency::DisjointSets) -> (Vec<Point>, Vec<[u32; 4]>) {
     let corner_sets: Vec<u32> = (0..4 * elements.len() as u32).map(|k| sets.find(k)).collect();
     let point = |k: u32| elements[k as usize / 4].tetrahedron.corners()[k as usize % 4];
-    let mut roots: Vec<u32> = corner_sets.iter().enumerate().filter(|(k, r)| **r == *k as u32).map(|(_, &r)| r).collect();
+    let mut roots: Vec<u32> =
+        corner_sets.iter().enumerate().filter(|(k, r)| **r == *k as u32).map(|(_, &r)| r).collect();
     roots.sort_by_key(|&root| (morton(point(root)), root));
     let mut node = vec![0u32; corner_sets.len()];
     for (n, &root) in roots.iter().enumerate() {
@@ -170,12 +171,7 @@ fn edges(tetrahedra: &[[u32; 4]]) -> Vec<[u32; 2]> {
     edges
 }
 
-fn embed(
-    elements: &[Element],
-    tetrahedra: &[[u32; 4]],
-    places: &[DVec3],
-    surface: &Surface,
-) -> Vec<Option<Embedding>> {
+fn embed(elements: &[Element], tetrahedra: &[[u32; 4]], places: &[DVec3], surface: &Surface) -> Vec<Option<Embedding>> {
     let mut a_triangle = vec![u32::MAX; surface.len()];
     for (t, corners) in surface.triangles.iter().enumerate().rev() {
         corners.iter().for_each(|&i| a_triangle[i as usize] = t as u32);

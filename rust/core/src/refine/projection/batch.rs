@@ -21,11 +21,7 @@ pub struct Batch<const N: usize, const M: usize> {
 
 impl<const N: usize, const M: usize> Batch<N, M> {
     /// Of the constraints that `colouring` names, in its order.
-    pub fn new(
-        colouring: &Colouring,
-        particles: impl Fn(u32) -> [u32; N],
-        rest: impl Fn(u32) -> [f32; M],
-    ) -> Self {
+    pub fn new(colouring: &Colouring, particles: impl Fn(u32) -> [u32; N], rest: impl Fn(u32) -> [f32; M]) -> Self {
         let count = colouring.order.len();
         let mut batch = Self {
             particles: std::array::from_fn(|_| Vec::with_capacity(count)),
