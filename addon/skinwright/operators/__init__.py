@@ -6,6 +6,7 @@ from . import (
     desparsify,
     match,
     presets,
+    refine,
     retarget_weights,
     sculpt,
     stored_weights,

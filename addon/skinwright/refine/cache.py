@@ -70,9 +70,7 @@ def steps(
     return CacheReport(obj.name, str(path), len(positions))
 
 
-def _poses(
-    obj: bpy.types.Object, character: characters.Character, frames: range
-) -> Iterator[NDArray[np.float64]]:
+def _poses(obj: bpy.types.Object, character: characters.Character, frames: range) -> Iterator[NDArray[np.float64]]:
     for _ in poses.frames(list(frames)):
         yield characters.pose(obj, character)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .. import native
 from .character import Character
 
-# Garments take all of the body's offset up to this share of the body's diagonal away, and nothing from three times that.
+# Garments take all of the body's offset up to this share of its diagonal away, and nothing from three times that.
 _NEAR = 0.02
 
 
@@ -20,9 +20,7 @@ class Follower:
     corners: NDArray[np.uint32]
     shares: NDArray[np.float64]
 
-    def positions(
-        self, pose_from_rest: NDArray[np.float64], displacement: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
+    def positions(self, pose_from_rest: NDArray[np.float64], displacement: NDArray[np.float32]) -> NDArray[np.float32]:
         """(n, 3) skinned, moved by the body's posed displacement (V, 3)."""
         moved = np.einsum("nk,nkc->nc", self.shares, displacement[self.corners])
         return self.character.skinned(pose_from_rest) + moved.astype(np.float32)
@@ -31,7 +29,7 @@ class Follower:
 def follow(body: Character, garment: Character, body_from_garment: NDArray[np.float64]) -> Follower:
     """Hang a garment on the body's rest surface. Raises native.NativeError."""
     places = garment.positions @ body_from_garment[:3, :3].T + body_from_garment[:3, 3]
-    triangle, distance, shares = native.closest(
+    triangle, shares, distance = native.closest(
         body.name, body.positions, body.triangles, body.rows, len(body.bones), places.astype(np.float32)
     )
     diagonal = float(np.linalg.norm(np.ptp(body.positions, axis=0)))

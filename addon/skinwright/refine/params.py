@@ -50,10 +50,19 @@ class CorrectiveParams(RefineParams):
     """How joints are sampled for corrective shape keys."""
 
     angle: float = setting(
-        math.radians(120), "Bend", "How far joints are bent", least=math.radians(10), most=math.radians(150), unit="ANGLE"
+        math.radians(120),
+        "Bend",
+        "How far joints are bent",
+        least=math.radians(10),
+        most=math.radians(150),
+        unit="ANGLE",
     )
     twist: float = setting(
-        math.radians(90), "Twist", "How far joints are twisted; 0 leaves twist out", most=math.radians(170), unit="ANGLE"
+        math.radians(90),
+        "Twist",
+        "How far joints are twisted; 0 leaves twist out",
+        most=math.radians(170),
+        unit="ANGLE",
     )
     samples: int = setting(4, "Samples", "Keys along each direction of a joint", least=1, most=12, soft_most=6)
     tolerance: float = setting(

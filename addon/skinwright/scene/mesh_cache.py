@@ -16,7 +16,9 @@ def check(obj: bpy.types.Object) -> None:
     before = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE"), 0)
     changing = [m.name for m in list(obj.modifiers)[:before] if m.type in {"SUBSURF", "MIRROR", "ARRAY", "BEVEL"}]
     if changing:
-        raise SceneError(f"{obj.name} has {changing[0]} before its armature, which changes the vertices: apply it first")
+        raise SceneError(
+            f"{obj.name} has {changing[0]} before its armature, which changes the vertices: apply it first"
+        )
 
 
 def play(obj: bpy.types.Object, path: Path, kind: str, first: int) -> None:

@@ -5,8 +5,8 @@ from bpy.props import PointerProperty
 from bpy.types import Object, PropertyGroup, Scene
 
 from .overlay import SKINWRIGHT_PG_overlay
-from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
 from .refine import SKINWRIGHT_PG_refine
+from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
 from .transfer import SKINWRIGHT_PG_transfer, TransferSettings

@@ -80,6 +80,4 @@ class SKINWRIGHT_PT_refine_sampling(Tab, Panel):
         context.scene.skinwright.refine.draw_sampling(self.layout.column())
 
 
-register, unregister = registration(
-    SKINWRIGHT_PT_refine, SKINWRIGHT_PT_refine_solver, SKINWRIGHT_PT_refine_sampling
-)
+register, unregister = registration(SKINWRIGHT_PT_refine, SKINWRIGHT_PT_refine_solver, SKINWRIGHT_PT_refine_sampling)
