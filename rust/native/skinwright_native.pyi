@@ -326,8 +326,8 @@ def biharmonic_embedding(
     """Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance (Lipman et al. 2010,
     doi:10.1145/1805964.1805971), from the smallest non-zero eigenpairs of the cotangent Laplacian: phi_k / lambda_k.
 
-    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too small
-    for are zero, and so are the rows of vertices without a triangle.
+    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too
+    small for are zero, and so are the rows of vertices without a triangle.
     """
 
 @final
@@ -382,10 +382,10 @@ def retarget_weights(
 ) -> Retarget:
     """Weights of one character for another with a matching skeleton.
 
-    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may stand,
-    face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's, negative for
-    none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor, by
-    `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
+    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may
+    stand, face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's,
+    negative for none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor,
+    by `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
     distance.
 
     "skeleton" brings the target into the source's pose and proportions bone by bone and matches by position and normal;
@@ -425,6 +425,7 @@ def start_retarget_weights(
     smoothing_factor: float = 0.2,
 ) -> Job:
     """Starts `retarget_weights` on threads of its own; `Job.result` returns a `Retarget`."""
+
 @final
 class AutoWeights:
     """Automatic weights: one row per vertex, none empty, each summing to 1."""
@@ -433,9 +434,9 @@ class AutoWeights:
     def weights(self) -> Weights: ...
     @property
     def report(self) -> dict[str, Any]:
-        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
-        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
-        `seconds` by stage."""
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside`
+        (bones no part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice,
+        `residual`, `seconds` by stage."""
 
 def automatic_weights(
     positions: ArrayLike,
@@ -453,10 +454,10 @@ def automatic_weights(
     overlapping, of many islands, split at seams (coincident vertices get equal rows).
 
     `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
-    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
-    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
-    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
-    """
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse
+    distances to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit.
+    `resolution`: cells along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat
+    keeps to its bone."""
 
 def start_automatic_weights(
     positions: ArrayLike,
@@ -490,8 +491,8 @@ class Embedding:
 
     @property
     def report(self) -> dict[str, Any]:
-        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
-        are outside of the mesh), `penalty`, `seconds`."""
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones
+        whose heads are outside of the mesh), `penalty`, `seconds`."""
 
 def embed_skeleton(
     positions: ArrayLike,
@@ -505,9 +506,9 @@ def embed_skeleton(
 ) -> Embedding:
     """Puts the bones of a template into a mesh that has none.
 
-    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
-    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
-    needs the shape of the mesh only.
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int,
+    negative for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it
+    is. "medial" needs the shape of the mesh only.
     """
 
 def start_embed_skeleton(
