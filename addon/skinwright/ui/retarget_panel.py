@@ -16,7 +16,14 @@ class SKINWRIGHT_UL_bone_map(UIList):
     """The bones of the target; those without a sure partner are marked."""
 
     def draw_item(
-        self, context: Context, layout: UILayout, _settings: Any, entry: Any, _icon: int, *_more: Any
+        self,
+        context: Context,
+        layout: UILayout,
+        _settings: Any,
+        entry: Any,
+        _icon: int,
+        _active: Any,
+        _property: str,
     ) -> None:
         """Bone, partner, confidence."""
         sure = entry.source and (entry.source != entry.found or entry.confidence >= UNSURE)
