@@ -35,6 +35,7 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "relative_max_distance" => settings.max_distance = Length::Relative(value.extract()?),
             "max_normal_angle" => settings.max_normal_angle = value.extract()?,
             "match_flipped_normals" => settings.match_flipped_normals = value.extract()?,
+            "relative_weld_tolerance" => settings.weld_tolerance = Length::Relative(value.extract()?),
             "mask" => mask = mask_values(value.extract()?)?,
             "smoothness_length" => smoothness_length = value.extract()?,
             "relative_smoothness_length" => settings.smoothness_length = Length::Relative(value.extract()?),
