@@ -53,7 +53,7 @@ def prim(positions, triangles, island, is_solved, rows):
         for other in best:
             squared, _, _ = gap(other, faces_of([k]))
             if squared < best[other][0]:
-                best[other] = squared, answer[k][1]
+                best[other] = squared, rows[members[k][0]]
     return answer
 
 

@@ -151,7 +151,7 @@ impl Inpainting {
         }
         let core = Arc::clone(&self.core);
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Job::start(self.threads, work)
+        Job::start(self.threads, work, |py, transfer| Ok(Py::new(py, Transfer::of(py, transfer)?)?.into_any()))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other
