@@ -57,16 +57,13 @@ def compute(
     body: Body, garments: list[Garment], params: TransferParams
 ) -> Jobs[tuple[dict[str, Result], list[Failure]]]:
     """The new rows by target's name, and the targets that have no answer."""
-    bones = bone_source(body) if body.bones else None
-    fields = None
-    if body.fields:
-        packed = scalar_fields.pack(body.field_weights, len(body.fields))
-        fields = _source(body, packed, len(body.fields) + 1)
+    fields = scalar_fields.pack(body.field_weights, len(body.fields)) if body.fields else None
+    source = bone_source(body) if body.bones else _source(body, fields, len(body.fields) + 1)
     results: dict[str, Result] = {}
     failures: list[Failure] = []
     for together in solved_together(garments, params):
         try:
-            found = yield from _compute_group(body, together, bones, fields, params)
+            found = yield from _compute_group(body, together, source, fields, params)
         except native.NativeError as error:
             failures.append(Failure(" + ".join(garment.object.name for garment in together), str(error)))
         else:
@@ -123,6 +120,10 @@ class Prepared:
         """Solve on threads of Rust's own; a mask (V,) or None for each target."""
         return self._inpainting.start(mask=self._spread(masks), **params)
 
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the source other weights."""
+        self._inpainting.set_source_weights(rows, n_columns)
+
     def split(self, values: NDArray) -> list[NDArray]:
         """Values of all vertices, mirrored ones too, as those of each target's own."""
         starts = np.cumsum([0, *(len(g.geometry.positions) for g in self.garments)], dtype=np.int64)
@@ -160,27 +161,25 @@ def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
 
 
 def _compute_group(
-    body: Body,
-    garments: list[Garment],
-    bones: native.Source | None,
-    fields: native.Source | None,
-    params: TransferParams,
+    body: Body, garments: list[Garment], source: native.Source, fields: Rows | None, params: TransferParams
 ) -> Jobs[list[Result]]:
     """The results of targets that are solved together."""
     start = time.perf_counter()
-    names: list[str] = []
+    prepared = Prepared(source, garments, params.threads)
     rows = [csr.empty(len(garment.writable)) for garment in garments]
-    if fields:
-        prepared = Prepared(fields, garments, params.threads)
-        answers, rows = yield from _field_rows(prepared, body, params)
-        names = body.fields
-    if bones:
-        prepared = Prepared(bones, garments, params.threads)
-        answers, of_bones = yield from _bone_rows(prepared, [g.mask for g in garments], params)
-        rows = [csr.beside(left, len(names), right) for left, right in zip(rows, of_bones, strict=True)]
+    if body.bones:
+        answers, rows = yield from _bone_rows(prepared, [g.mask for g in garments], params)
+    if fields is not None:
+        if body.bones:
+            # Points and factorisations are those of the bones: the solve alone is done again.
+            prepared.set_source_weights(fields, len(body.fields) + 1)
+        of_fields, left = yield from _field_rows(prepared, body, params)
+        answers = answers if body.bones else of_fields
+        rows = [csr.beside(one, len(body.fields), other) for one, other in zip(left, rows, strict=True)]
+    names = body.fields if fields is not None else []
     seconds = (time.perf_counter() - start) / len(garments)
     return [
-        to_result(body, garment, answer, names + (garment.names if bones else []), row, seconds)
+        to_result(body, garment, answer, names + (garment.names if body.bones else []), row, seconds)
         for garment, answer, row in zip(garments, answers, rows, strict=True)
     ]
 
