@@ -92,13 +92,15 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
     fields = [name for name in chosen if name not in bones]
     with shapes.looked_at(objects, params.geometry):
         seen = [shapes.read_source(obj, params.geometry, bones + fields) for obj in objects]
+    geometry = parts.united([shape.geometry for shape, _ in seen])
+    mesh.check_faces(source, geometry)
     rows = parts.united_rows([rows for _, rows in seen])
     bone_weights, field_weights = _split_columns(rows, len(bones))
     return Body(
         object=source,
         objects=objects,
         rigs=rigs,
-        geometry=parts.united([shape.geometry for shape, _ in seen]),
+        geometry=geometry,
         bones=bones,
         bone_weights=bone_weights,
         fields=fields,
