@@ -59,9 +59,11 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if that is
+    larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices that
+    close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
     `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
@@ -72,6 +74,7 @@ class TransferSettings(TypedDict, total=False):
     max_normal_angle: float
     match_flipped_normals: bool
     mask: ArrayLike | None
+    relative_weld_tolerance: float
     smoothness_length: float | None
     relative_smoothness_length: float
     smoothing_iterations: int
@@ -92,6 +95,7 @@ class Source:
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
+        target_edges: ArrayLike | None = None,
         threads: int = 0,
         **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
@@ -102,7 +106,14 @@ class Inpainting:
     system is factored again only when its own unknowns or the smoothness length change."""
 
     def __new__(
-        cls, source: Source, target_positions: ArrayLike, target_triangles: ArrayLike, *, threads: int = 0
+        cls,
+        source: Source,
+        target_positions: ArrayLike,
+        target_triangles: ArrayLike,
+        *,
+        target_edges: ArrayLike | None = None,
+        threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Inpainting: ...
     @property
     def distance(self) -> NDArray[np.float32]: ...
@@ -134,11 +145,13 @@ def transfer_weights(
     target_positions: ArrayLike,
     target_triangles: ArrayLike,
     *,
+    target_edges: ArrayLike | None = None,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
+    relative_weld_tolerance: float = 1e-06,
     smoothness_length: float | None = None,
     relative_smoothness_length: float = 0.05,
     smoothing_iterations: int = 0,

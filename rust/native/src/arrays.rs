@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use numpy::ndarray::{Dimension, Ix1, Ix2, Ix3};
+use numpy::ndarray::{ArrayView1, Dimension, Ix1, Ix2, Ix3};
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike, PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -86,14 +86,25 @@ fn check_whole(object: &Bound<'_, PyAny>, least: f64, most: f64) -> PyResult<()>
 
 /// Rows of an (N, 3) array; `name` is the argument's.
 pub fn triples<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
-    if array.shape()[1] != 3 {
-        let shape = array.shape();
-        return Err(InvalidParameter::new_err(format!(
-            "{name} must have shape (N, 3), not ({}, {})",
-            shape[0], shape[1]
-        )));
+    rows_of(array, name, |row| [row[0], row[1], row[2]])
+}
+
+/// Rows of an (N, 2) array; `name` is the argument's.
+pub fn pairs<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 2]>> {
+    rows_of(array, name, |row| [row[0], row[1]])
+}
+
+fn rows_of<T: Element, const N: usize>(
+    array: &Matrix<'_, T>,
+    name: &str,
+    row: impl Fn(ArrayView1<'_, T>) -> [T; N],
+) -> PyResult<Vec<[T; N]>> {
+    let shape = array.shape();
+    if shape[1] != N {
+        let (found, columns) = (shape[0], shape[1]);
+        return Err(InvalidParameter::new_err(format!("{name} must have shape (N, {N}), not ({found}, {columns})")));
     }
-    Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+    Ok(array.as_array().rows().into_iter().map(row).collect())
 }
 
 /// Entries of a 1-D array.
