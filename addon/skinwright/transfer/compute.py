@@ -18,7 +18,7 @@ from ..scene.mesh import Geometry
 from . import completion, merging, parts, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
-from .prepared import Prepared, keywords
+from .prepared import Prepared
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _bone_rows(
     joined = any(_joins_old_weights(garment, params) for garment in prepared.garments)
     # Where old weights or mirror images join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
-    transfer, solved = yield prepared.start(masks, **keywords(params, limit))
+    transfer, solved = yield prepared.start(masks, params, limit)
     rows = []
     for number, garment in enumerate(prepared.garments):
         folded = garment.completion.fold(prepared.rows_of(solved, number), garment.opposite)
@@ -203,7 +203,7 @@ def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
 def _field_rows(prepared: Prepared, body: Body, params: TransferParams) -> Jobs[tuple[list[Answer], list[Rows]]]:
     n = len(body.fields)
     masks = [garment.mask for garment in prepared.garments]
-    transfer, solved = yield prepared.start(masks, **keywords(params, max_influences=0))
+    transfer, solved = yield prepared.start(masks, params, max_influences=0)
     same = np.arange(n + 1, dtype=np.int64)
     rows = []
     for number, garment in enumerate(prepared.garments):

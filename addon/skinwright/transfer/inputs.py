@@ -26,7 +26,7 @@ class Garment:
     which the pose leads to what was seen. `locks` are all its locked groups. `names` are the body's bones,
     then the target's other bones; of these columns `held` marks those that stay as they are, `chosen` those that come
     from the body, and `opposite` has the other side's. The old weights, over `names` and the body's fields, are empty
-    where they take no part.
+    where they take no part. `distance` is the one in force if the target's size tells nothing of it.
     """
 
     object: bpy.types.Object
@@ -42,6 +42,7 @@ class Garment:
     opposite: NDArray[np.int64]
     before: Rows
     fields_before: Rows
+    distance: float | None
     seconds: float
 
     @property
@@ -77,6 +78,7 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
         opposite=_opposite_columns(body),
         before=vertex_groups.read(target, names if mixed or held.any() else []),
         fields_before=vertex_groups.read(target, body.fields if params.mix_factor < 1 else []),
+        distance=_wire_distance(shape.geometry, body, params),
         seconds=time.perf_counter() - start,
     )
     _check_locks(garment)
@@ -104,6 +106,13 @@ def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], pa
         return False
     binding.check(target, params.make_single_user)
     return True
+
+
+def _wire_distance(geometry: mesh.Geometry, body: Body, params: TransferParams) -> float | None:
+    """Strings have no width that a distance could be a part of: it is one of the source's size."""
+    if len(geometry.triangles) or params.max_distance is not None:
+        return None
+    return params.relative_max_distance * float(np.linalg.norm(body.geometry.size))
 
 
 def _opposite_columns(body: Body) -> NDArray[np.int64]:

@@ -24,7 +24,7 @@ class Prepared:
         self.garments = garments
         self.name = " + ".join(garment.object.name for garment in garments)
         united = parts.united([garment.geometry for garment in garments])
-        self._settings = keywords(params, params.max_influences)
+        self._settings = self._keywords(params)
         self._inpainting = native.Inpainting(
             source,
             self.name,
@@ -59,9 +59,19 @@ class Prepared:
         mask = thresholds.pop("mask", None)
         return self._own(self._inpainting.matched(mask=self._spread([mask]), **self._settings | thresholds))
 
-    def start(self, masks: Sequence[NDArray[np.uint8] | None], **params: Any) -> native.Job:
+    def start(
+        self, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, max_influences: int
+    ) -> native.Job:
         """Solve on threads of Rust's own; a mask (V,) or None for each target."""
-        return self._inpainting.start(mask=self._spread(masks), **params)
+        settings = self._keywords(params) | {"max_influences": max_influences}
+        return self._inpainting.start(mask=self._spread(masks), **settings)
+
+    def _keywords(self, params: TransferParams) -> dict[str, Any]:
+        """The settings of a solve."""
+        settings = params.native()
+        del settings["threads"]
+        distances = [garment.distance for garment in self.garments]
+        return settings if None in distances else settings | {"max_distance": max(distances)}  # type: ignore[type-var]
 
     def lost_halves(self) -> list[bool]:
         """Whether what Mirror modifiers add to a target matches less than half as well as the target itself."""
@@ -101,10 +111,3 @@ class Prepared:
             for garment, mask in zip(self.garments, masks, strict=True)
         ]
         return np.concatenate([g.completion.spread(mask) for g, mask in zip(self.garments, full, strict=True)])
-
-
-def keywords(params: TransferParams, max_influences: int) -> dict[str, Any]:
-    """The settings of a solve."""
-    keywords = params.native() | {"max_influences": max_influences}
-    del keywords["threads"]
-    return keywords
