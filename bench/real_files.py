@@ -106,6 +106,7 @@ def _panels(mesh: tuple[np.ndarray, np.ndarray]) -> bpy.types.Object:
 def _through_gltf(mesh: tuple[np.ndarray, np.ndarray]) -> bpy.types.Object:
     """Out to a file and in again: flat shading gives every face vertices of its own."""
     obj = _mesh(*mesh)
+    bpy.context.view_layer.update()  # else its list holds what is gone
     for other in bpy.context.view_layer.objects:
         other.select_set(other == obj)
     bpy.context.view_layer.objects.active = obj

@@ -125,10 +125,14 @@ def in_collections_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
 
 @contextmanager
 def object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it."""
+    """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it.
+
+    What scripts have just moved, added or removed is where it now is.
+    """
     edited = list(context.objects_in_mode) if context.mode == "EDIT_MESH" else []
     if edited:
         bpy.ops.object.mode_set(mode="OBJECT")
+    context.view_layer.update()
     try:
         yield
     finally:
