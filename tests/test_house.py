@@ -33,7 +33,8 @@ MAY_IMPORT = {
     "registration": set(),
     "declared": {"errors"},
     "files": {"errors"},
-    "native": {"csr", "errors"},
+    "memory": set(),
+    "native": {"csr", "errors", "memory"},
     "reporting": {"csr"},
     "soundness": {"csr", "errors"},
     "scene": {"csr", "errors", "soundness"},
@@ -47,7 +48,7 @@ MAY_IMPORT = {
     "headless": FLOOR | set(FEATURES),
     "__init__": {"headless", "operators", "overlay", "preferences", "settings", "scene", "ui"},
 }
-NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "native", "reporting", "soundness"}
+NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "memory", "native", "reporting", "soundness"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 

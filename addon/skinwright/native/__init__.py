@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import memory
 from ..csr import Rows
 from ..errors import Refused
 
@@ -45,6 +46,16 @@ def problem() -> str:
 def addon_version() -> str:
     """The version in the manifest."""
     return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
+
+
+# The part of the free memory that one piece of work may take; the preferences set it.
+memory_share = 0.5
+
+
+def _set_budget() -> None:
+    """Before each piece of work, as what is free changes."""
+    free = memory.free_bytes()
+    _module.set_memory_budget(None if free is None else int(free * memory_share))
 
 
 class Source:
@@ -119,6 +130,18 @@ class Job:
         with _naming(self._name):
             transfer = self._job.result()
         return transfer, _rows(transfer.weights)
+
+
+def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
+    """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
+
+    Characters are positions, triangles, frames and lengths; `rows` are the source's over its bones.
+    """
+    positions, triangles, frames, lengths = source
+    with _naming(name):
+        weights = _module.Weights(*rows, len(lengths))
+        arrays = (positions, triangles, weights, frames, lengths, *target)
+        return Job(name, _module.start_retarget_weights(*arrays, **options))
 
 
 def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
@@ -230,9 +253,10 @@ def _rows(weights: Any) -> Rows:
 @contextmanager
 def _naming(name: str) -> Iterator[None]:
     """What the module raises, a panic of Rust included, as one class whose sentence names the object."""
+    _set_budget()
     try:
         yield
-    except (_module.SkinwrightError, OverflowError, RuntimeError) as error:
+    except (_module.SkinwrightError, MemoryError, OverflowError, RuntimeError) as error:
         raise NativeError(f"{name}: {error}") from error
     except BaseException as error:
         if type(error).__name__ != "PanicException":

@@ -7,6 +7,7 @@ from bpy.types import Context, Object, Operator
 from .. import native
 from ..errors import Refused, internal
 from ..stored import keeping
+from .modal import brush_session
 
 # The modes of operators that work on meshes as they are selected.
 MESH_MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
@@ -70,6 +71,8 @@ def refusal_in_mode(context: Context, purpose: str) -> str:
     """Why nothing can be done to meshes now, or nothing; `purpose` ends the sentence."""
     if native.problem():
         return native.problem()
+    if brush_session.refusal():
+        return brush_session.refusal()
     if context.mode not in MESH_MODES:
         return f"Go to Object, Edit or Weight Paint mode to {purpose}"
     return ""

@@ -7,6 +7,7 @@ from .. import jobs, preferences
 from ..registration import registration
 from ..reporting import Report
 from ..settings import TransferSettings
+from ..settings.properties import last_used
 from ..transfer import TransferParams, steps
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
 from .comparison import compared
@@ -22,7 +23,8 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
     bl_idname = "skinwright.transfer_weights"
     bl_label = "Transfer Weights"
     bl_description = "Transfer weights from the source to the selected meshes, inpainting where they do not fit closely"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    # No PRESET: there is one list of presets, that of the panel.
+    bl_options = {"REGISTER", "UNDO"}
 
     freeze: BoolProperty(
         name="Freeze Operator",
@@ -73,8 +75,9 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
             return {"FINISHED"}
         return self.complete(context, jobs.wait(self._steps(context)))
 
-    def complete(self, _context: Context, report: Report) -> set[str]:
-        """Say what was done."""
+    def complete(self, context: Context, report: Report) -> set[str]:
+        """Say what was done, and leave what it was done with to the panel, the preview, the mask and the check."""
+        last_used(self.properties, context.scene.skinwright.transfer, TransferSettings.__annotations__)
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> jobs.Jobs[Report]:

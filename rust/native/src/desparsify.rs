@@ -7,6 +7,7 @@ use skinwright_core::desparsify::{self as core, Method, Skeleton};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
@@ -37,6 +38,7 @@ pub fn desparsify(
         return Err(InvalidParameter::new_err(needs));
     }
     let locked = locked.map(|l| entries(&l)).unwrap_or_default();
+    memory::expect("Desparsification", memory::of_desparsify(weights.vertex_count(), n))?;
     let result = enter(py, threads, || {
         let mesh = match (&positions, &triangles) {
             (Some(positions), Some(triangles)) if method == Method::Surface => {
@@ -65,7 +67,7 @@ fn method_of(name: &str) -> PyResult<Method> {
 }
 
 /// Head and tail of every bone from a (B, 2, 3) array.
-fn segments(array: &Stack<'_, f32>) -> PyResult<Vec<[[f32; 3]; 2]>> {
+pub(crate) fn segments(array: &Stack<'_, f32>) -> PyResult<Vec<[[f32; 3]; 2]>> {
     let &[_, 2, 3] = array.shape() else {
         let shape = array.shape();
         return Err(InvalidParameter::new_err(format!("bone_segments must have shape (B, 2, 3), not {shape:?}")));

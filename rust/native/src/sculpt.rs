@@ -8,6 +8,7 @@ use skinwright_core::sculpt::{self as core, MAX_MEMBERS, Options, Residuals, Sim
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, SkinwrightError, enter};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
@@ -73,6 +74,7 @@ impl SculptSolver {
         let (rest, weights) = (triples(&rest_positions, "rest_positions")?, weights.to_core(py)?);
         let locked = locked.map(|l| entries(&l)).unwrap_or_default();
         let options = Options { kappa, passes };
+        memory::expect("Sculpting", memory::of_sculpt(rest.len()))?;
         let solver = enter(py, threads, || core::SculptSolver::new(&rest, weights, &locked, options))?;
         Ok(Self { core: Mutex::new(Session { solver, pose: None }), threads })
     }

@@ -8,6 +8,7 @@ mod lanes;
 mod morton;
 mod nearest;
 mod node;
+mod oriented;
 mod search;
 
 use glam::{DVec3, Vec3};
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 use crate::mesh::TriMesh;
 use bvh::Bvh;
 pub use cheapest::{Bound, Priced};
+pub use oriented::{OrientedPoint, OrientedSurface};
 use search::Batch;
 
 pub(crate) use morton::order as morton_order;

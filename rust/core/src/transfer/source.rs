@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::normals;
 use crate::error::{Error, Result};
@@ -110,12 +110,6 @@ impl Source {
             }
         }
         merge_and_normalise(row, start);
-    }
-
-    /// Position of a surface point.
-    pub(super) fn position(&self, point: &SurfacePoint) -> DVec3 {
-        let corners = self.geometry.triangles[point.triangle as usize].map(|i| self.geometry.positions[i as usize]);
-        std::iter::zip(corners, point.barycentric).map(|(p, share)| Vec3::from(p).as_dvec3() * share).sum()
     }
 
     /// Whether a position lies behind the triangle of a surface point.
