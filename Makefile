@@ -101,6 +101,11 @@ wheels: .venv/blender.stamp cargo
 	.venv/bin/pip install ziglang==$(ZIG)
 	.venv/bin/python blender_scripts/build_wheels.py $(PLATFORMS)
 
+## make real-files   how far seams of real garments open in poses: bench/real_files.md
+.PHONY: real-files
+real-files: .venv/native.stamp
+	$(IN_TIME) 3600 .venv/bin/python bench/real_files.py
+
 ## make extension  the zips that Blender installs, one per platform, in dist/
 extension: .venv/blender.stamp cargo
 	@ls dist/wheels/*.whl >/dev/null 2>&1 || $(MAKE) wheels PLATFORMS=linux-x64

@@ -42,7 +42,7 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched{self._within()}"]
         counts.append(f"{self._sum('inpainted')} inpainted")
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
@@ -57,6 +57,11 @@ class Report:
         groups = f"{self._sum('groups')} groups written, {created} of them new"
         compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
         return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
+
+    def _within(self) -> str:
+        """The distance in force, if it is one for all."""
+        distances = {f"{g.native['max_distance']:.3g}" for g in self.garments if "max_distance" in g.native}
+        return f" within {distances.pop()}" if len(distances) == 1 else ""
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)

@@ -69,10 +69,22 @@ class Source:
 class Inpainting:
     """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
 
-    def __init__(self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0) -> None:
+    def __init__(
+        self,
+        source: Source,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        threads: int = 0,
+        *,
+        edges: NDArray | None = None,
+        **settings: Any,
+    ) -> None:
         self.name = name
         with _naming(name):
-            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads)
+            self._inpainting = _module.Inpainting(
+                source._source, positions, triangles, target_edges=edges, threads=threads, **settings
+            )
         self.distance: NDArray[np.float32] = self._inpainting.distance
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands

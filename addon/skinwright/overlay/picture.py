@@ -158,14 +158,14 @@ def _picture_of_faults(result: WeightCheck | None, shape: dict) -> Picture:
     """0 for a sound vertex, else the number of its worst fault, from 1."""
     values = np.zeros(len(shape["positions"]), np.int64)
     if result is None:
-        return Picture(**shape, values=values, rows=[], note="Check the weights first")
+        return Picture(**shape | {"note": "Check the weights first"}, values=values, rows=[])
     rows = [(0, f"Sound: {int((~result.any_fault()).sum()):,}")]
     for number, fault in enumerate(Fault, 1):
         values[result.faulty[fault]] = number
         if result.faulty[fault].any():
             rows.append((number, f"{fault.name.replace('_', ' ').title()}: {int(result.faulty[fault].sum()):,}"))
     worst = f"Worst: {result.worst.name}" if result.worst else "No fault in any pose"
-    return Picture(**shape, values=values, rows=rows, note=worst)
+    return Picture(**shape | {"note": worst}, values=values, rows=rows)
 
 
 def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:

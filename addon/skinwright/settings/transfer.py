@@ -34,6 +34,7 @@ class TransferSettings:
         layout.prop(self, "source_scope")
         layout.prop(self, "geometry")
         layout.prop(self, "join_borders")
+        layout.prop(self, "relative_weld_tolerance")
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
         layout.prop(self, "max_normal_angle")
         layout.prop(self, "match_flipped_normals")
