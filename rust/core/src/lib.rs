@@ -12,6 +12,7 @@ pub mod fill;
 pub mod inside;
 pub mod laplacian;
 pub mod mesh;
+pub mod penetration;
 pub mod progress;
 pub mod refine;
 pub mod sculpt;

@@ -7,6 +7,7 @@ mod fill;
 mod inpainting;
 mod job;
 mod memory;
+mod penetration;
 mod ranges;
 mod refine;
 mod sculpt;
@@ -35,6 +36,8 @@ mod skinwright_native {
     use crate::job::Job;
     #[pymodule_export]
     use crate::memory::set_memory_budget;
+    #[pymodule_export]
+    use crate::penetration::penetration;
     #[pymodule_export]
     use crate::refine::{Refiner, intersecting_pairs};
     #[pymodule_export]
