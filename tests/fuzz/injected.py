@@ -52,8 +52,6 @@ def build():
         builders.paint(coat, Arm__L=0.3, Arm__R=0.6, pin=0.5)
     coats[1].modifiers.new("Armature", "ARMATURE").object = rig
     bpy.context.scene.skinwright.transfer.source = body
-    bpy.ops.skinwright.store_weights()
-    builders.select(*coats)
     for coat in coats:
         builders.select(coat)
         bpy.ops.skinwright.store_weights()
@@ -80,7 +78,8 @@ def state(coats):
 
 
 def run_once(name, injector):
-    coats = build()
+    with contextlib.redirect_stdout(io.StringIO()):
+        coats = build()
     before = state(coats)
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         sys.settrace(injector)
