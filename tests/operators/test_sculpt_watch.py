@@ -13,9 +13,6 @@ class Session:
     def __init__(self):
         self.asked = []
 
-    def assert_state(self):
-        self.asked.append("state")
-
     def expect_stroke(self):
         self.asked.append("expect")
 
@@ -68,15 +65,6 @@ def test_only_a_brush_that_rests_leaves_time_for_more(watch, changes, session):
     assert session.asked == []
     watch.expect_stroke()
     assert session.asked == ["expect"]
-
-
-def test_after_an_undo_of_blenders_the_session_comes_first(watch, changes, session):
-    changes.version += 1
-    changes.undone += 1
-    watch.look(0.1)
-    changes.version += 1
-    watch.look(0.1)
-    assert session.asked == ["state", 0.1, "stroke", 0.1, "stroke"]
 
 
 def test_a_refused_stroke_is_not_looked_at_again(watch, session, monkeypatch):

@@ -115,6 +115,18 @@ class Job:
         return transfer, _rows(transfer.weights)
 
 
+def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
+    """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
+
+    Characters are positions, triangles, frames and lengths; `rows` are the source's over its bones.
+    """
+    positions, triangles, frames, lengths = source
+    with _naming(name):
+        weights = _module.Weights(*rows, len(lengths))
+        arrays = (positions, triangles, weights, frames, lengths, *target)
+        return Job(name, _module.start_retarget_weights(*arrays, **options))
+
+
 def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
     """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
     with _naming(name):

@@ -1,10 +1,22 @@
 """Operators, one file or folder per feature."""
 
-from . import check_weights, desparsify, match, presets, sculpt, stored_weights, transfer_weights
-from .modal import timers
+from . import (
+    bone_map,
+    check_weights,
+    desparsify,
+    match,
+    presets,
+    retarget_weights,
+    sculpt,
+    stored_weights,
+    transfer_weights,
+)
+from .modal import keep_alive, timers, undo
 
 MODULES = (
     timers,
+    keep_alive,
+    undo,
     transfer_weights,
     presets,
     *match.MODULES,
@@ -12,4 +24,6 @@ MODULES = (
     desparsify,
     *sculpt.MODULES,
     stored_weights,
+    retarget_weights,
+    bone_map,
 )

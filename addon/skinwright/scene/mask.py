@@ -46,14 +46,20 @@ def read(
     return np.where(painted, INPAINT, AUTOMATIC).astype(np.uint8)
 
 
+def check(obj: bpy.types.Object) -> None:
+    """Raise SceneError for a mask that cannot be edited here."""
+    settings = obj.skinwright
+    if settings.mask_group and settings.mask_reading != Reading.STEER.value:
+        raise SceneError(f"The mask of {obj.name} is read as another tool's: set Reading to Steer to edit it here")
+
+
 def ensure(obj: bpy.types.Object) -> str:
     """Name of the group that is the object's mask, made and filled with automatic where there is none.
 
     Raises SceneError for a mask that is read in another tool's way.
     """
+    check(obj)
     settings = obj.skinwright
-    if settings.mask_group and settings.mask_reading != Reading.STEER.value:
-        raise SceneError(f"The mask of {obj.name} is read as another tool's: set Reading to Steer to edit it here")
     if settings.mask_group in obj.vertex_groups:
         return settings.mask_group
     settings.mask_group, settings.mask_reading = obj.vertex_groups.new(name=DEFAULT_GROUP).name, "STEER"

@@ -72,11 +72,12 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> Sc
         raise SceneError(f"{obj.name} has {len(obj.data.vertices)} vertices, but {n} were sculpted: use the same mesh")
     session = SculptSession(obj, options)
     try:
-        for number in _poses(bpy.data.objects[session.rig_name], sculpts):
+        for number in _poses(session.rig.find(), sculpts):
             positions = sculpts["positions"][number]
             touched = np.flatnonzero(np.isfinite(positions).all(axis=1))
             session.sculpt(touched, positions[touched].astype(np.float32))
     except BaseException:
+        # Whatever has failed, a panic of the native module included: nothing stays half done.
         session.cancel()
         raise
     return session.commit()

@@ -6,7 +6,10 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
+pub mod biharmonic;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
 pub mod fill;
 pub mod inside;
@@ -15,6 +18,7 @@ pub mod mesh;
 pub mod penetration;
 pub mod progress;
 pub mod refine;
+pub mod retarget;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;
