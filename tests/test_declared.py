@@ -133,3 +133,28 @@ def test_defaults_are_the_librarys(addon, native):
     solver = inspect.signature(native.SculptSolver).parameters
     for key, value in addon.declared.native_keywords(addon.sculpt.params.SculptParams()).items():
         assert solver[key].default == value
+
+
+def test_choices_are_the_librarys_methods(addon, native):
+    """Each list of methods is ALL of its enum in core, which the library names when it refuses another."""
+    import re
+    from pathlib import Path
+
+    weights = native.Weights.from_dense([[1.0]])
+    sheet = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    rows = native.Weights.from_dense([[1.0]] * 3)
+    calls = {
+        ("transfer", "TransferParams", "island_policy"): lambda: native.transfer_weights(
+            *sheet, rows, *sheet, island_policy="none"
+        ),
+        ("desparsify", "DesparsifyParams", "method"): lambda: native.desparsify(weights, [-1], method="none"),
+    }
+    stub = (Path(__file__).parents[1] / "rust" / "native" / "skinwright_native.pyi").read_text()
+    for (feature, kind, name), call in calls.items():
+        with pytest.raises(native.InvalidParameter, match="must be one of") as refused:
+            call()
+        library = set(re.split(r", ", str(refused.value).rpartition("must be one of ")[2]))
+        _, one = addon.declared.declared(getattr(getattr(addon, feature), kind))[name]
+        assert set(one.choices) == library, name
+        literals = [set(re.findall(r'"(\w+)"', group)) for group in re.findall(r"Literal\[([^]]*)\]", stub)]
+        assert library in literals, f"the stub lacks {library}"

@@ -119,7 +119,7 @@ def gltf_character(path: Path) -> Character:
 
     A bone reaches along its own Y axis as far as its best aligned child; a leaf half the step from its parent.
     """
-    from native import glb
+    from support import glb
 
     body = glb.joined([mesh for mesh in glb.read_meshes(path) if mesh.weights is not None])
     names, parents, frames = _skeleton(path)
@@ -138,7 +138,7 @@ def gltf_character(path: Path) -> Character:
 
 
 def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
-    from native.glb import _accessor
+    from support.glb import _accessor
 
     blob = path.read_bytes()
     length = struct.unpack_from("<I", blob, 12)[0]
