@@ -14,13 +14,14 @@ ADDON = ROOT / "addon" / "skinwright"
 MODULES = sorted(p.relative_to(ADDON) for p in ADDON.rglob("*.py") if "presets" not in p.relative_to(ADDON).parts)
 
 # ui -> operators (by bl_idname) -> features, settings -> scene, native -> the wheel.
-FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "scene"}
+FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "scene", "soundness"}
 # A feature may import the floor, and of the other features only these.
 FEATURES = {
     "transfer": set(),
     "match": {"transfer"},
     "desparsify": set(),
     "sculpt": {"desparsify"},
+    "stored": {"transfer"},
     "check": set(),
     "retarget": {"transfer"},
     "refine": set(),
@@ -32,20 +33,22 @@ MAY_IMPORT = {
     "registration": set(),
     "declared": {"errors"},
     "files": {"errors"},
-    "native": {"csr", "errors"},
+    "memory": set(),
+    "native": {"csr", "errors", "memory"},
     "reporting": {"csr"},
-    "scene": {"csr", "errors"},
+    "soundness": {"csr", "errors"},
+    "scene": {"csr", "errors", "soundness"},
     "jobs": {"csr", "errors", "native"},
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
     "settings": {"declared", "errors"} | set(FEATURES),
     "preferences": {"declared", "native", "registration", "settings"},
-    "overlay": FLOOR | {"match", "transfer"},
+    "overlay": FLOOR | {"match", "stored", "transfer"},
     "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
     "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},
     "headless": FLOOR | set(FEATURES),
     "__init__": {"headless", "operators", "overlay", "preferences", "settings", "scene", "ui"},
 }
-NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "native", "reporting"}
+NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "memory", "native", "reporting", "soundness"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 

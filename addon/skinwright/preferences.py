@@ -15,6 +15,14 @@ class Preferences(declared.Params):
     """What holds for this machine rather than for a file."""
 
     threads: int = declared.threads()
+    memory_share: float = declared.setting(
+        native.memory_share,
+        "Memory",
+        "The part of the free memory that one calculation may take; larger ones are refused with their estimate",
+        least=0.05,
+        most=1,
+        unit="FACTOR",
+    )
 
 
 class SKINWRIGHT_AP_preferences(AddonPreferences):
@@ -32,6 +40,7 @@ class SKINWRIGHT_AP_preferences(AddonPreferences):
         """Settings first, then the state of the native module."""
         self.layout.use_property_split = True
         self.layout.prop(self, "threads")
+        self.layout.prop(self, "memory_share", slider=True)
         problem = native.problem()
         row = self.layout.row()
         row.alert = bool(problem)
@@ -39,9 +48,12 @@ class SKINWRIGHT_AP_preferences(AddonPreferences):
 
 
 def threads(context: Context) -> int:
-    """The preference, or all where the add-on runs without being enabled."""
+    """The preference, or all where the add-on runs without being enabled. The memory's is put in force as well."""
     addon = context.preferences.addons.get(__package__)
-    return addon.preferences.threads if addon and addon.preferences else 0
+    if not addon or not addon.preferences:
+        return 0
+    native.memory_share = addon.preferences.memory_share
+    return addon.preferences.threads
 
 
 register, unregister = registration(SKINWRIGHT_AP_preferences)

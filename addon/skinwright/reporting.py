@@ -1,6 +1,7 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +20,7 @@ class GarmentReport:
     locked_groups: list[str]
     kept_groups: list[str]
     armature_added: bool
+    bound_in_pose: bool
     seconds: dict[str, float]
     native: dict[str, Any]
     warnings: list[str] = field(default_factory=list)
@@ -26,11 +28,12 @@ class GarmentReport:
 
 @dataclass
 class Report:
-    """All targets of one transfer."""
+    """All targets of one transfer; `failures` are the sentences of those that were left out."""
 
     source: str
     garments: list[GarmentReport]
     warnings: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
 
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
@@ -42,6 +45,9 @@ class Report:
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
         if loose:
             counts.append(f"{loose} loose parts")
+        bound = [garment.target for garment in self.garments if garment.bound_in_pose]
+        if bound:
+            counts.append(f"{', '.join(bound)} bound in the pose")
         created = sum(len(garment.created_groups) for garment in self.garments)
         seconds = sum(sum(garment.seconds.values()) for garment in self.garments)
         groups = f"{self._sum('groups')} groups written, {created} of them new"
@@ -52,12 +58,14 @@ class Report:
 
     def all_warnings(self) -> list[str]:
         """Sentences worth a look, the body's first."""
-        return self.warnings + [warning for garment in self.garments for warning in garment.warnings]
+        left_out = [f"Left out: {sentence}" for sentence in self.failures]
+        return left_out + self.warnings + [warning for garment in self.garments for warning in garment.warnings]
 
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         garments = [_plain(vars(garment)) for garment in self.garments]
-        return {"source": self.source, "garments": garments, "warnings": self.warnings, "sentence": self.sentence()}
+        said = {"warnings": self.warnings, "failures": self.failures, "sentence": self.sentence()}
+        return {"source": self.source, "garments": garments} | said
 
 
 def _plain(value: Any) -> Any:
@@ -116,3 +124,28 @@ class SculptReport:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return _plain(vars(self)) | {"sentence": self.sentence()}
+
+
+@dataclass(frozen=True)
+class LastResult:
+    """What the operator `title` has done or refused, for the panel: a report in the status bar is gone in seconds."""
+
+    title: str
+    sentence: str
+    warnings: tuple[str, ...] = ()
+    failed: bool = False
+
+
+last: LastResult | None = None
+
+
+def remember(title: str, sentence: str, warnings: Sequence[str] = (), *, failed: bool = False) -> None:
+    """Show this in the panel until the next result."""
+    global last
+    last = LastResult(title, sentence, tuple(warnings), failed)
+
+
+def forget() -> None:
+    """Show nothing."""
+    global last
+    last = None

@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
 
 def version() -> str: ...
+def set_memory_budget(bytes: int | None) -> None:
+    """Bytes that one piece of work may take, None for whatever the machine has; what would take more is refused with a
+    MemoryError that states the estimate."""
+
 
 class SkinwrightError(ValueError): ...
 class NothingMatched(SkinwrightError): ...
@@ -158,12 +162,12 @@ def fill(
     weld: ArrayLike | None = None,
     threads: int = 0,
 ) -> NDArray[np.float64]:
-    """Values at all vertices (V, C) from values at some: minimises the sum over columns of w'(S + length^2 S M^-1 S)w plus
-    b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
+    """Values at all vertices (V, C) from values at some: minimises, summed over the columns,
+    w'(S + length^2 S M^-1 S)w plus b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
 
     `positions` (V, 3), `triangles` (T, 3); `kinds` (V,): 0 free, 1 fixed, 2 soft; `rows` (V, C): the known values;
-    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution; `weld` (V,):
-    for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
+    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution;
+    `weld` (V,): for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
     """
 
 def linear_blend(

@@ -1,17 +1,17 @@
 """Desparsification: every vertex gets bones to choose from, as members of weight 0."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import csr, native
+from .. import csr, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..reporting import DesparsifyReport
-from ..scene import armature, mesh, sculpting, vertex_groups
+from ..scene import armature, mesh, sculpting, vertex_groups, weight_state
 from ..scene.error import SceneError
 from .params import DesparsifyParams
 
@@ -37,10 +37,20 @@ def desparsify(obj: bpy.types.Object, params: DesparsifyParams) -> DesparsifyRep
     return desparsify_all([obj], params)[0]
 
 
-def desparsify_all(objects: Sequence[bpy.types.Object], params: DesparsifyParams) -> list[DesparsifyReport]:
-    """The same for several meshes, which are all computed before the first is written."""
+def desparsify_all(
+    objects: Sequence[bpy.types.Object],
+    params: DesparsifyParams,
+    before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
+) -> list[DesparsifyReport]:
+    """The same for several meshes: all are computed before the first is written, and all are written or none.
+
+    `before_write` is told when writing begins.
+    """
     answers = [_compute(obj, params) for obj in objects]
-    return [_write(obj, answer, params.n) for obj, answer in zip(objects, answers, strict=True)]
+    if before_write:
+        before_write(objects)
+    with weight_state.all_or_nothing(objects):
+        return [_write(obj, answer, params.n) for obj, answer in zip(objects, answers, strict=True)]
 
 
 def _compute(obj: bpy.types.Object, params: DesparsifyParams) -> _Answer:
@@ -55,6 +65,8 @@ def _compute(obj: bpy.types.Object, params: DesparsifyParams) -> _Answer:
         if params.selected_only
         else np.arange(len(obj.data.vertices), dtype=np.int64)
     )
+    free = deforming & ~np.isin(names, sorted(vertex_groups.locked(obj)))
+    soundness.check_sums(obj.name, after, free)
     return _Answer(names, vertices, csr.take_rows(before, vertices), csr.take_rows(after, vertices))
 
 

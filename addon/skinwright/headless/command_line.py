@@ -15,10 +15,13 @@ from .. import declared, files, native
 from ..declared import SettingError
 from ..errors import Refused, internal
 from ..reporting import Report, SculptReport
+from ..scene import blend_file
+from ..scene.blend_file import mesh_named, object_named
 from ..sculpt.params import SculptParams, options_from_json
 from ..sculpt.replay import read, replay
 from ..transfer import TransferParams, from_json, transfer_weights
 from . import wardrobe as wardrobe_command
+from . import weights as weights_command
 
 DONE, FAILED, USAGE = 0, 1, 2
 Params = TransferParams | SculptParams
@@ -36,6 +39,7 @@ def main(arguments: list[str]) -> int:
     _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
     _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
+    _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
     return _run(parser, arguments)
 
 
@@ -62,6 +66,13 @@ def wardrobe(arguments: list[str]) -> int:
     return _run(parser, arguments)
 
 
+def weights(arguments: list[str]) -> int:
+    """The same without the word `weights`, for the script."""
+    parser = argparse.ArgumentParser(prog="weights.py", description="Keep, bring back, compare weights.")
+    _add_weights(parser)
+    return _run(parser, arguments)
+
+
 def _add_transfer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
@@ -81,6 +92,11 @@ def _add_sculpt(parser: argparse.ArgumentParser) -> None:
 def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
     wardrobe_command.add(parser)
     parser.set_defaults(run=wardrobe_command.run)
+
+
+def _add_weights(parser: argparse.ArgumentParser) -> None:
+    weights_command.add(parser)
+    parser.set_defaults(run=weights_command.run)
 
 
 def _add_common(parser: argparse.ArgumentParser, default: Params) -> None:
@@ -156,17 +172,17 @@ def _work(options: argparse.Namespace, params: Params) -> Report | SculptReport:
         raise _Failure(native.problem())
     _check_outputs(options)
     if options.blend:
-        _open(options.blend)
+        blend_file.open_file(options.blend)
     report = options.work(options, params)
     if options.save:
-        _save(options.save)
+        blend_file.save_copy(options.save)
     return report
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Before anything is done: no output may cost a file."""
     inputs = [path for name in options.inputs if (path := getattr(options, name))]
-    blends = [options.blend or Path(bpy.data.filepath)] if options.blend or bpy.data.filepath else []
+    blends = [options.blend] if options.blend else blend_file.opened()
     if options.report:
         others = [*inputs, *blends, *([options.save] if options.save else [])]
         files.check_output(options.report, others=others, overwrite=options.overwrite, replaces=files.REPORT)
@@ -175,34 +191,13 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
-    return transfer_weights(bpy.context, _object(options.source), [_object(n) for n in options.target], params)
+    return transfer_weights(
+        bpy.context, object_named(options.source), [object_named(n) for n in options.target], params
+    )
 
 
 def _sculpt(options: argparse.Namespace, params: SculptParams) -> SculptReport:
-    return replay(_object(options.target), read(options.sculpts), params)
-
-
-def _open(blend: Path) -> None:
-    if not blend.is_file():
-        raise _Failure(f"there is no file {blend}")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(blend.resolve()), load_ui=False)
-    except RuntimeError as error:
-        raise _Failure(f"{blend} cannot be opened: {error}") from error
-
-
-def _save(path: Path) -> None:
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), copy=True, check_existing=False)
-    except RuntimeError as error:
-        raise _Failure(f"{path} cannot be saved: {error}") from error
-
-
-def _object(name: str) -> bpy.types.Object:
-    obj = bpy.data.objects.get(name)
-    if obj is None:
-        raise _Failure(f"there is no object {name}; there are {', '.join(sorted(bpy.data.objects.keys())) or 'none'}")
-    return obj
+    return replay(mesh_named(options.target), read(options.sculpts), params)
 
 
 def _write_report(options: argparse.Namespace, params: Params, report: Report | SculptReport) -> None:

@@ -9,7 +9,7 @@ import time
 import bpy
 
 from .. import jobs, native
-from ..scene import armature, brush, changes, mask, vertex_groups
+from ..scene import armature, brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
 from .session import MatchSession
@@ -35,10 +35,10 @@ class MaskPainting:
         """Prepare; nothing is written. Raises SceneError or native.NativeError."""
         settings = context.scene.skinwright
         mask.check(target)
-        self.before = vertex_groups.snapshot(target)
+        self.before = weight_state.capture(target)
         self.mask_group, self.overlay = target.skinwright.mask_group, settings.overlay.kind
         self.session = MatchSession(settings.transfer.source, target, params)
-        self.armature = armature.find(settings.transfer.source) if params.add_armature else None
+        self.source = settings.transfer.source if params.add_armature else None
         self.problem = ""
         # When weights were written, and how long after the mask had been seen to have changed.
         self.written_at: list[float] = []
@@ -46,7 +46,7 @@ class MaskPainting:
         self._runner: jobs.Runner | None = None
         self._asked: tuple = ()
         self._since = 0.0
-        self._modifier = ""
+        self._modifiers: list[str] = []
         self.expect_stroke()
 
     def open(self, context: bpy.types.Context) -> None:
@@ -55,14 +55,16 @@ class MaskPainting:
         group = mask.ensure(target)
         target.vertex_groups.active = target.vertex_groups[group]
         context.scene.skinwright.overlay.kind = "MATCH"
-        if self.armature and armature.find(target) is None:
+        if self.source and armature.find(self.source) and armature.find(target) is None:
             # Else the artist would see no weight at work.
-            self._modifier = armature.attach(target, self.armature).name
+            there = set(target.modifiers.keys())
+            armature.attach(target, self.source)
+            self._modifiers = [name for name in target.modifiers.keys() if name not in there]
 
     @property
     def armature_added(self) -> bool:
         """Whether the target had no armature and now has the source's."""
-        return bool(self._modifier)
+        return bool(self._modifiers)
 
     def expect_stroke(self) -> None:
         """A brush is down or may come down: the mask is to be read before Blender evaluates and counts the change."""
@@ -140,10 +142,11 @@ class MaskPainting:
         target = self.session.target()
         if target is None:
             raise SceneError(f"{self.session.target_name} has another number of vertices than before")
-        vertex_groups.restore(target, self.before)
+        weight_state.apply(target, self.before)
         target.skinwright.mask_group = self.mask_group
-        if self._modifier in target.modifiers:
-            target.modifiers.remove(target.modifiers[self._modifier])
+        for name in self._modifiers:
+            if name in target.modifiers:
+                target.modifiers.remove(target.modifiers[name])
 
     def close(self, context: bpy.types.Context) -> None:
         """The overlay becomes what it was."""

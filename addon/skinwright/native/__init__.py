@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import memory
 from ..csr import Rows
 from ..errors import Refused
 
@@ -45,6 +46,16 @@ def problem() -> str:
 def addon_version() -> str:
     """The version in the manifest."""
     return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
+
+
+# The part of the free memory that one piece of work may take; the preferences set it.
+memory_share = 0.5
+
+
+def _set_budget() -> None:
+    """Before each piece of work, as what is free changes."""
+    free = memory.free_bytes()
+    _module.set_memory_budget(None if free is None else int(free * memory_share))
 
 
 class Source:
@@ -110,6 +121,34 @@ def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options:
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
 
 
+def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:
+    """(V, 3) where linear blend skinning takes rest positions (V, 3) by matrices (B, 4, 4), all in one space."""
+    with _naming(name):
+        return _module.linear_blend(rest, _module.Weights(*rows, len(pose_from_rest)), pose_from_rest)
+
+
+class Surface:
+    """A surface, whose closest points are asked for."""
+
+    def __init__(self, name: str, positions: NDArray, triangles: NDArray) -> None:
+        self.name = name
+        self._corners = positions[triangles.astype(np.int64)].astype(np.float64)
+        n = len(positions)
+        one_column = (np.arange(n + 1, dtype=np.uint32), np.zeros(n, np.uint32), np.ones(n, np.float32))
+        with _naming(name):
+            self._source = _module.Source(positions, triangles, _module.Weights(*one_column, 1))
+
+    def depths(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+        """(P,) how far points (P, 3) lie below their closest face, 0 outside."""
+        with _naming(self.name):
+            triangle, barycentric, _ = self._source.closest_points(points)
+        corners = self._corners[triangle]
+        closest = np.einsum("pc,pcx->px", barycentric, corners)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
+        return np.maximum(np.einsum("px,px->p", normal, closest - points) / length, 0)
+
+
 class SculptSolver:
     """A character prepared for strokes, with its poses, targets and undo; keyword arguments as in the stub."""
 
@@ -151,15 +190,18 @@ class SculptSolver:
 
     def undo(self) -> NDArray[np.uint32] | None:
         """Takes the last stroke back; the vertices it had touched."""
-        return self._solver.undo()
+        with _naming(self.name):
+            return self._solver.undo()
 
     def redo(self) -> NDArray[np.uint32] | None:
         """Does it again; likewise."""
-        return self._solver.redo()
+        with _naming(self.name):
+            return self._solver.redo()
 
     def rows(self, vertices: NDArray | None = None) -> Rows:
         """The present rows of these vertices, or of all."""
-        return _rows(self._solver.weights(vertices))
+        with _naming(self.name):
+            return _rows(self._solver.weights(vertices))
 
     @property
     def stroke_count(self) -> int:
@@ -173,7 +215,8 @@ class SculptSolver:
 
     def rest_residuals(self, pose: int) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """The vertices (n,) sculpted in a pose, and the offsets (n, 3) at rest that weights cannot stand in for."""
-        return self._solver.rest_residuals(pose=pose)
+        with _naming(self.name):
+            return self._solver.rest_residuals(pose=pose)
 
 
 def _rows(weights: Any) -> Rows:
@@ -182,7 +225,13 @@ def _rows(weights: Any) -> Rows:
 
 @contextmanager
 def _naming(name: str) -> Iterator[None]:
+    """What the module raises, a panic of Rust included, as one class whose sentence names the object."""
+    _set_budget()
     try:
         yield
-    except _module.SkinwrightError as error:
+    except (_module.SkinwrightError, MemoryError, OverflowError, RuntimeError) as error:
         raise NativeError(f"{name}: {error}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise NativeError(f"{name}: internal error in Skinwright, please report it: {error}") from error

@@ -1,6 +1,6 @@
 """Operators, one file or folder per feature."""
 
-from . import check_weights, desparsify, match, presets, sculpt, transfer_weights
+from . import check_weights, desparsify, match, panel_buttons, presets, sculpt, stored_weights, transfer_weights
 from .modal import keep_alive, timers, undo
 
 MODULES = (
@@ -13,4 +13,6 @@ MODULES = (
     check_weights,
     desparsify,
     *sculpt.MODULES,
+    stored_weights,
+    panel_buttons,
 )

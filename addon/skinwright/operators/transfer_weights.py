@@ -7,6 +7,7 @@ from .. import preferences
 from ..registration import registration
 from ..reporting import Report
 from ..settings import TransferSettings
+from ..settings.properties import last_used
 from ..transfer import TransferParams, steps, transfer_weights
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
 from .modal.long_work import LongWork
@@ -21,7 +22,8 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
     bl_idname = "skinwright.transfer_weights"
     bl_label = "Transfer Weights"
     bl_description = "Transfer weights from the source to the selected meshes, inpainting where they do not fit closely"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    # No PRESET: there is one list of presets, that of the panel.
+    bl_options = {"REGISTER", "UNDO"}
 
     freeze: BoolProperty(
         name="Freeze Operator",
@@ -44,7 +46,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         vertices = sum(len(target.data.vertices) for target in targets(context))
         if vertices < LONG_WORK_VERTICES or self.freeze:
             return self.execute(context)
-        return self.attempt(lambda: self.begin(context, steps(*self._inputs(context))))
+        return self.attempt(lambda: self.begin(context, steps(*self._inputs(context), before_write=self.keep_before)))
 
     def draw(self, _context: Context) -> None:
         """The redo panel."""
@@ -63,10 +65,11 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         if self.freeze:
             self.report({"INFO"}, "Frozen: changes take effect once Freeze Operator is off")
             return {"FINISHED"}
-        return self.complete(context, transfer_weights(*self._inputs(context)))
+        return self.complete(context, transfer_weights(*self._inputs(context), before_write=self.keep_before))
 
-    def complete(self, _context: Context, report: Report) -> set[str]:
-        """Say what was done."""
+    def complete(self, context: Context, report: Report) -> set[str]:
+        """Say what was done, and leave what it was done with to the panel, the preview, the mask and the check."""
+        last_used(self.properties, context.scene.skinwright.transfer, TransferSettings.__annotations__)
         return self.tell(report.sentence(), report.all_warnings())
 
     def _inputs(self, context: Context) -> tuple[Context, Object, list[Object], TransferParams]:

@@ -18,11 +18,16 @@ INFLUENCES = np.array(
 # Pressed to half its length or less, as at rest, stretched to twice its length or more.
 STRETCH = np.array([(0.13, 0.4, 0.67), (0.57, 0.77, 0.87), (0.96, 0.96, 0.96), (0.96, 0.65, 0.51), (0.7, 0.09, 0.17)])
 
+# Equal, then from pale to dark red with the difference; single-hued, so that lightness alone tells it.
+DIFFERENCE = np.array([(0.93, 0.93, 0.93), (0.99, 0.75, 0.55), (0.94, 0.42, 0.27), (0.75, 0.1, 0.15), (0.35, 0.0, 0.1)])
+
 
 def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
     """(V, 3) of what a preview.Picture of this kind holds."""
     if kind == "MATCH":
         return of_categories(values)
+    if kind == "DIFFERENCE":
+        return of_difference(values)
     return of_influences(values) if kind == "INFLUENCES" else of_stretch(values)
 
 
@@ -41,3 +46,10 @@ def of_stretch(stretch: NDArray[np.floating]) -> NDArray[np.float32]:
     at = np.clip(np.nan_to_num(stretch), -1, 1) * 2 + 2
     steps = np.arange(len(STRETCH), dtype=np.int64)
     return np.stack([np.interp(at, steps, STRETCH[:, channel]) for channel in range(3)], axis=1).astype(np.float32)
+
+
+def of_difference(difference: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(V, 3) of differences (V,) from 0 to 1; small ones take more of the scale than large ones."""
+    at = np.sqrt(np.clip(difference, 0, 1)) * (len(DIFFERENCE) - 1)
+    steps = np.arange(len(DIFFERENCE), dtype=np.int64)
+    return np.stack([np.interp(at, steps, DIFFERENCE[:, channel]) for channel in range(3)], axis=1).astype(np.float32)

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
+from ..match import explain
 from ..match import session as match_session
 from ..match.session import Category, Match, MatchSession
 from ..scene import armature, changes, deformation, mesh, vertex_groups
+from ..stored import comparing
 from ..transfer.params import TransferParams
 
 CATEGORY_NAMES = {
@@ -45,7 +47,7 @@ class Picture:
     normals: NDArray[np.float32]
     triangles: NDArray[np.integer]
     values: NDArray[np.number]
-    rows: Sequence[tuple[int, str]]
+    rows: Sequence[tuple[float, str]]
     histograms: list[Histogram] = field(default_factory=list)
     note: str = ""
 
@@ -58,7 +60,7 @@ def forget() -> None:
     """Drop what is kept between drawings."""
     global _kept, _triangles
     _kept = _triangles = None
-    match_session.current = None
+    match_session.current = comparing.current = explain.current = None
 
 
 def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Picture | None:
@@ -69,7 +71,7 @@ def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Pi
     if obj is None:
         return None
     match = _match(obj, session, params) if session else None
-    key = (kind, obj.name, changes.version, id(match))
+    key = (kind, obj.name, changes.version, id(match), id(comparing.current))
     if _kept is None or _kept[0] != key:
         _kept = (key, _make(context, kind, obj, session, match))
     return _kept[1]
@@ -112,6 +114,8 @@ def _make(
     }
     if session and match:
         return _picture_of_match(match, session, shape)
+    if kind == "DIFFERENCE":
+        return _picture_of_difference(obj, shape)
     if kind == "INFLUENCES":
         return _picture_of_influences(obj, shape)
     values = deformation.stretch(mesh.edges(obj), mesh.rest_positions(obj.data), positions)
@@ -155,6 +159,17 @@ def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
     return Picture(**shape, values=count, rows=rows, note=note)
+
+
+def _picture_of_difference(obj: bpy.types.Object, shape: dict) -> Picture:
+    """As it was when the weights were compared: comparing takes too long for every drawing."""
+    shown = comparing.current
+    if shown is None or shown.object_name != obj.name or len(shown.difference) != len(shape["positions"]):
+        return Picture(**shape, values=np.zeros(len(shape["positions"])), rows=[(0, "Press Compare Weights")])
+    changed = int((shown.difference > 1e-6).sum())
+    rows: list[tuple[float, str]] = [(0, f"Equal, but for {changed:,} vertices"), (0.5, "Half on other bones")]
+    rows.append((1, "All on other bones"))
+    return Picture(**shape, values=shown.difference, rows=rows)
 
 
 def influences(rows: Rows) -> NDArray[np.int64]:

@@ -63,3 +63,16 @@ def decimal(value: float, one: Setting) -> float:
         if np.float32(value) == np.float32(exact):
             return float(exact)
     return float(str(np.float32(value)))
+
+
+def last_used(properties: Any, settings: Any, names: Iterable[str]) -> None:
+    """Make what an operator was given, by its redo panel or by a script, the panel's settings."""
+    for name in names:
+        if properties.is_property_set(name) and getattr(settings, name) != getattr(properties, name):
+            setattr(settings, name, getattr(properties, name))
+
+
+def reset(settings: Any, names: Iterable[str]) -> None:
+    """Give settings their defaults."""
+    for name in names:
+        settings.property_unset(name)

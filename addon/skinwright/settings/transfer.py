@@ -31,7 +31,9 @@ class TransferSettings:
 
     def draw_matching(self, layout: UILayout) -> None:
         """Shapes and thresholds."""
+        layout.prop(self, "source_scope")
         layout.prop(self, "geometry")
+        layout.prop(self, "join_borders")
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
         layout.prop(self, "max_normal_angle")
         layout.prop(self, "match_flipped_normals")
@@ -47,11 +49,15 @@ class TransferSettings:
 
     def draw_writing(self, layout: UILayout) -> None:
         """Limit, mix, and what else may change."""
+        layout.prop(self, "symmetrize")
         layout.prop(self, "max_influences")
         layout.prop(self, "mix_factor")
         layout.prop(self, "selected_only")
         layout.prop(self, "add_armature")
+        layout.prop(self, "add_corrective_smooth")
+        layout.prop(self, "replace_others")
         layout.prop(self, "make_single_user")
+        layout.prop(self, "skip_failing")
 
     def _draw_length(self, layout: UILayout, mode: str, relative: str, absolute: str) -> None:
         row = layout.row(align=True)
@@ -76,5 +82,6 @@ class SKINWRIGHT_PG_transfer(TransferSettings, PropertyGroup):
         name="Source",
         description="The body whose weights are transferred to the selected meshes",
         type=Object,
-        poll=lambda _settings, obj: obj.type == "MESH",
+        # Shapes of bones are meshes too, and have no weights.
+        poll=lambda _settings, obj: obj.type == "MESH" and bool(obj.vertex_groups),
     )

@@ -8,7 +8,8 @@ from .. import declared
 from ..declared import Params, max_influences, setting, threads
 
 Groups = Literal["BONE_DEFORM", "BONE_SELECT", "ALL", "ACTIVE"]
-Geometry = Literal["REST", "CURRENT"]
+Geometry = Literal["AS_SHOWN", "REST", "CURRENT"]
+SourceScope = Literal["PARTS", "OBJECT", "ARMATURE", "COLLECTION"]
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
 Reading = Literal["STEER", "PAINTED"]
 
@@ -49,13 +50,31 @@ class TransferParams(Params):
             "ACTIVE": ("Active Group", "The active group of the source"),
         },
     )
+    source_scope: SourceScope = setting(
+        "PARTS",
+        "Body",
+        "Which meshes are taken as one body with the source",
+        choices={
+            "PARTS": ("Source and Its Parts", "The source and the meshes on its armature that continue its borders"),
+            "OBJECT": ("Source Alone", "The source and nothing else"),
+            "ARMATURE": ("All on Its Armature", "Every visible mesh that the source's armature deforms"),
+            "COLLECTION": ("All in Its Collection", "Every visible mesh in the source's collection"),
+        },
+    )
     geometry: Geometry = setting(
-        "REST",
+        "AS_SHOWN",
         "Geometry",
         "Which shapes are laid over each other",
         choices={
+            "AS_SHOWN": (
+                "As Shown, in Rest Pose",
+                "The shapes with shape keys and modifiers, but not as they are posed",
+            ),
             "REST": ("Rest", "The shapes without modifiers, shape keys or pose"),
-            "CURRENT": ("Current", "The shapes as they are posed and deformed now"),
+            "CURRENT": (
+                "Current",
+                "The shapes as they are posed and deformed now; what does not follow the pose yet is bound in it",
+            ),
         },
     )
     max_distance: float | None = setting(
@@ -88,6 +107,9 @@ class TransferParams(Params):
     )
     match_flipped_normals: bool = setting(
         True, "Flipped Normals", "Match surfaces that face the other way too, as linings do", native=True
+    )
+    join_borders: bool = setting(
+        True, "Join Borders", "Solve targets whose borders lie on each other as one mesh, so that no gap opens there"
     )
     mask: Mask | None = setting(None, "Mask", "A vertex group that steers the match, for every target the same")
     smoothness_length: float | None = setting(
@@ -138,6 +160,11 @@ class TransferParams(Params):
         unit="FACTOR",
         native=True,
     )
+    symmetrize: bool = setting(
+        False,
+        "Symmetrize",
+        "Give vertices that mirror each other across the armature's X the same weights, left and right exchanged",
+    )
     max_influences: int = max_influences(native=True)
     mix_factor: float = setting(
         1.0,
@@ -150,17 +177,23 @@ class TransferParams(Params):
         False, "Selected Vertices", "Write only the vertices selected in Edit mode or by the paint mask"
     )
     add_armature: bool = setting(True, "Add Armature", "Let the source's armature deform targets that have none")
+    add_corrective_smooth: bool = setting(
+        False, "Corrective Smooth", "Give targets the Corrective Smooth modifier that the source has"
+    )
+    replace_others: bool = setting(
+        False,
+        "Replace Other Deformers",
+        "End what else moves a target or overrules its weights: bone parents, constraints, other armatures, modifiers",
+    )
+    skip_failing: bool = setting(
+        False, "Skip Failing", "Leave out targets that cannot be done, and write the others all the same"
+    )
     make_single_user: bool = setting(
         False,
         "Make Single User",
         "Give a target a mesh of its own where others share it, so that theirs keeps its weights",
     )
     threads: int = threads()
-
-    @property
-    def evaluated(self) -> bool:
-        """Whether the shapes are taken with what deforms them now."""
-        return self.geometry == "CURRENT"
 
     def native(self) -> dict[str, Any]:
         """The keyword arguments of the native transfer; the mask is the caller's."""

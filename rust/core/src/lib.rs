@@ -13,6 +13,7 @@ pub mod inside;
 pub mod laplacian;
 pub mod mesh;
 pub mod progress;
+pub mod refine;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;

@@ -11,6 +11,8 @@ use skinwright_core::transfer::{self as core, MatchMethod};
 use crate::arrays::{Matrix, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
+use crate::memory;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::source::Source;
 use crate::transfer::{Closest, Transfer};
@@ -26,6 +28,7 @@ pub struct Inpainting {
     core: Arc<Mutex<core::Inpainting>>,
     closest: Arc<Closest>,
     islands: Py<PyArray1<u32>>,
+    n_bones: u32,
     threads: usize,
 }
 
@@ -45,6 +48,12 @@ fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting
     inpainting.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Raises MemoryError where solving for the vertices that do not match would take too much.
+pub(crate) fn expect_solve(matched: &[bool]) -> PyResult<()> {
+    let unknowns = matched.iter().filter(|&&matched| !matched).count();
+    memory::expect("The transfer", memory::of_solve(matched.len(), unknowns))
+}
+
 #[pymethods]
 impl Inpainting {
     #[new]
@@ -54,17 +63,18 @@ impl Inpainting {
         source: &Source,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let positions = triples(&target_positions, "target_positions")?;
         let triangles = triples(&target_triangles, "target_triangles")?;
-        let source = source.core.clone();
+        memory::expect("Preparing the target", memory::of_target(positions.len(), triangles.len()))?;
+        let (source, n_bones) = (source.core.clone(), source.core.n_bones());
         let core = enter(py, threads, || {
             core::Inpainting::new(source, positions, triangles, MatchMethod::default(), &Progress::default())
         })?;
         let closest = Arc::new(Closest::of(py, &core)?);
         let islands = read_only(py, core.islands().of_vertex().to_vec())?;
-        Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, threads })
+        Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, n_bones, threads })
     }
 
     /// Distance of each vertex to its closest source point (V,), world units.
@@ -107,6 +117,7 @@ impl Inpainting {
     #[pyo3(signature = (**settings))]
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
+        expect_solve(&self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?)?;
         let solve =
             |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
         let transfer = self.enter(py, solve)?;
@@ -115,11 +126,16 @@ impl Inpainting {
 
     /// Starts `solve` on threads of its own.
     #[pyo3(signature = (**settings))]
-    fn start(&self, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
+    fn start(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
         let (settings, mask) = keywords(settings)?;
+        // While another job holds the target there is nobody to ask; that one was looked at.
+        if let Ok(mut held) = self.core.try_lock() {
+            let inpainting: &mut core::Inpainting = &mut held;
+            expect_solve(&enter(py, self.threads, || inpainting.matched(mask.as_deref(), &settings))?)?;
+        }
         let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Ok(Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer))))
+        Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer)))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other
@@ -127,6 +143,10 @@ impl Inpainting {
     #[pyo3(signature = (**settings))]
     fn raw_weights<'py>(&self, py: Python<'py>, settings: Option<&Bound<'py, PyDict>>) -> PyResult<RawWeights<'py>> {
         let (settings, mask) = keywords(settings)?;
+        let matched = self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?;
+        expect_solve(&matched)?;
+        let unknowns = matched.iter().filter(|&&matched| !matched).count() as u64;
+        memory::expect("An array of all bones", 16 * unknowns * u64::from(self.n_bones))?;
         let raw = self.enter(py, |inpainting| inpainting.raw_weights(mask.as_deref(), &settings))?;
         let n_bones = raw.values.len().checked_div(raw.vertices.len()).unwrap_or(0);
         let shape = [raw.vertices.len(), n_bones];

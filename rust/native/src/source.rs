@@ -4,10 +4,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use skinwright_core::transfer as core;
+use skinwright_core::Progress;
+use skinwright_core::transfer::{self as core, MatchMethod};
 
 use crate::arrays::{Matrix, triples};
 use crate::error::enter;
+use crate::inpainting::expect_solve;
+use crate::memory;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::transfer::{Closest, Transfer};
 use crate::weights::Weights;
@@ -29,10 +33,11 @@ impl Source {
         positions: Matrix<'_, f32>,
         triangles: Matrix<'_, u32>,
         weights: &Weights,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
         let weights = weights.to_core(py)?;
+        memory::expect("Preparing the source", memory::of_source(positions.len(), triangles.len()))?;
         let core = enter(py, threads, || core::Source::new(&positions, triangles, weights))?;
         Ok(Self { core })
     }
@@ -44,7 +49,7 @@ impl Source {
         &self,
         py: Python<'py>,
         positions: Matrix<'_, f32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<ClosestPoints<'py>> {
         let positions = triples(&positions, "positions")?;
         let (triangles, barycentric, distances) = enter(py, threads, || {
@@ -64,15 +69,22 @@ impl Source {
         py: Python<'_>,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
         let positions = triples(&target_positions, "target_positions")?;
         let triangles = triples(&target_triangles, "target_triangles")?;
-        let (inpainting, transfer) = enter(py, threads, || {
-            core::transfer_weights(&self.core, positions, triangles, mask.as_deref(), &settings)
+        memory::expect("Preparing the target", memory::of_target(positions.len(), triangles.len()))?;
+        let (progress, mask) = (Progress::default(), mask.as_deref());
+        let (mut inpainting, matched) = enter(py, threads, || {
+            let (source, method) = (self.core.clone(), MatchMethod::default());
+            let mut inpainting = core::Inpainting::new(source, positions, triangles, method, &progress)?;
+            let matched = inpainting.matched(mask, &settings)?;
+            Ok((inpainting, matched))
         })?;
+        expect_solve(&matched)?;
+        let transfer = enter(py, threads, || inpainting.solve(mask, &settings, &progress))?;
         Closest::of(py, &inpainting)?.present(py, transfer)
     }
 }
@@ -93,7 +105,7 @@ pub fn transfer_weights(
     source_weights: &Weights,
     target_positions: Matrix<'_, f32>,
     target_triangles: Matrix<'_, u32>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Transfer> {
     let source = Source::new(py, source_positions, source_triangles, source_weights, threads)?;

@@ -9,12 +9,9 @@ from bpy.types import Context, Event, Object
 from ...errors import Refused
 from ...scene import modes
 from ...sculpt import session as sculpt_session
-from ...sculpt.session import Outcome, SculptOptions, SculptSession
+from ...sculpt.session import ADVICE, POOR, Outcome, SculptOptions, SculptSession
 from ..modal.brush_session import BrushSession, Message
 from .watch import StrokeWatch
-
-# Below this share of a sculpt reached, weights are not what is missing.
-POOR = 0.3
 
 
 class SculptBrushes(BrushSession):
@@ -131,4 +128,4 @@ def _sentence(outcome: Outcome) -> str:
     reached = f"{outcome.vertices} vertices, {outcome.reachability:.0%} of the sculpt reached"
     if outcome.reachability >= POOR:
         return reached
-    return f"{reached}: bend the joint further, lower Stiffness, or set Leftover to Shape Key"
+    return f"{reached}. {ADVICE}"
