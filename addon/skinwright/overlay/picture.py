@@ -155,10 +155,10 @@ def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     weights = vertex_groups.read(obj, _bone_names(obj))
     count = influences(weights)
     spare = len(weights.bones) - int(count.sum())
-    note = f"and {spare:,} members of weight 0" if spare else ""
+    notes = [shape["note"], f"and {spare:,} members of weight 0" if spare else ""]
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
-    return Picture(**shape, values=count, rows=rows, note=note)
+    return Picture(**shape | {"note": ". ".join(filter(None, notes))}, values=count, rows=rows)
 
 
 def _picture_of_difference(obj: bpy.types.Object, shape: dict) -> Picture:
