@@ -1,4 +1,4 @@
-"""Opens the sidebar at our tab in a file that asks for it, as the demo does: a tab cannot be chosen before it is drawn."""
+"""Opens the sidebar at our tab in a file that asks for it, as the demo does: only what is drawn has tabs."""
 
 import bpy
 from bpy.app.handlers import load_post, persistent
