@@ -62,12 +62,14 @@ class BaseMesh:
         )
 
 
-def load(wheel: Path, rig_name: str = "game_engine", shape: str = "") -> BaseMesh:
-    """Read the base mesh with one of its rigs, moved to a `shape` of the folder `targets` if one is named."""
+def load(wheel: Path, rig_name: str = "game_engine", shape: str | tuple[str, ...] = ()) -> BaseMesh:
+    """Read the base mesh with one of its rigs, moved by one or more shapes of the folder `targets`."""
     with zipfile.ZipFile(wheel) as archive:
         positions, groups = _read_obj(archive.read(_ROOT + "3dobjs/base.obj").decode())
-        if shape:
-            moves = np.loadtxt(gzip.decompress(archive.read(f"{_ROOT}targets/{shape}.target.gz")).decode().splitlines())
+        for name in (shape,) if isinstance(shape, str) else shape:
+            lines = gzip.decompress(archive.read(f"{_ROOT}targets/{name}.target.gz")).decode().splitlines()
+            # The average man's target moves nothing.
+            moves = np.array([line.split() for line in lines if line and line[0] != "#"], float).reshape(-1, 4)
             positions[moves[:, 0].astype(int)] += _to_blender(moves[:, 1:])
         rig = json.loads(archive.read(f"{_ROOT}rigs/standard/rig.{rig_name}.json"))
         painted = json.loads(archive.read(f"{_ROOT}rigs/standard/weights.{rig_name}.json"))["weights"]

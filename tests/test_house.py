@@ -42,7 +42,7 @@ MAY_IMPORT = {
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
     "settings": {"declared", "errors"} | set(FEATURES),
     "preferences": {"declared", "native", "registration", "settings"},
-    "overlay": FLOOR | {"match", "stored", "transfer"},
+    "overlay": FLOOR | {"check", "match", "stored", "transfer"},
     "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
     "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},
     "headless": FLOOR | set(FEATURES),

@@ -28,12 +28,17 @@ class GarmentReport:
 
 @dataclass
 class Report:
-    """All targets of one transfer; `failures` are the sentences of those that were left out."""
+    """All targets of one transfer.
+
+    `failures` are the sentences of those that were left out; `comparison` has the faults in test poses, by target,
+    before and after.
+    """
 
     source: str
     garments: list[GarmentReport]
     warnings: list[str] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
+    comparison: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
@@ -51,7 +56,8 @@ class Report:
         created = sum(len(garment.created_groups) for garment in self.garments)
         seconds = sum(sum(garment.seconds.values()) for garment in self.garments)
         groups = f"{self._sum('groups')} groups written, {created} of them new"
-        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s"
+        compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
+        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)
@@ -64,8 +70,21 @@ class Report:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         garments = [_plain(vars(garment)) for garment in self.garments]
-        said = {"warnings": self.warnings, "failures": self.failures, "sentence": self.sentence()}
+        said = {
+            "warnings": self.warnings,
+            "failures": self.failures,
+            "comparison": self.comparison,
+            "sentence": self.sentence(),
+        }
         return {"source": self.source, "garments": garments} | said
+
+
+def _before_and_after(figures: dict[str, Any]) -> str:
+    """The faults in test poses, as "torn 38 before, 2 after"."""
+    before, after = figures["before"], figures["after"]
+    if before is None:
+        return "in test poses: " + ", ".join(f"{count} {fault}" for fault, count in after.items())
+    return "in test poses: " + ", ".join(f"{fault} {before[fault]} before, {after[fault]} after" for fault in after)
 
 
 def _plain(value: Any) -> Any:

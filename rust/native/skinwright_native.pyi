@@ -16,7 +16,6 @@ def set_memory_budget(bytes: int | None) -> None:
     """Bytes that one piece of work may take, None for whatever the machine has; what would take more is refused with a
     MemoryError that states the estimate."""
 
-
 class SkinwrightError(ValueError): ...
 class NothingMatched(SkinwrightError): ...
 class InvalidMesh(SkinwrightError): ...
@@ -129,7 +128,8 @@ class Job:
     @property
     def done(self) -> bool: ...
     def cancel(self) -> None: ...
-    def result(self) -> Transfer: ...
+    def result(self) -> Any:
+        """Waits for what the function that started the job returns, or raises its error. May be called again."""
 
 def transfer_weights(
     source_positions: ArrayLike,
@@ -178,6 +178,22 @@ def linear_blend(
     `rest_positions` (V, 3) and `pose_from_rest` (B, 4, 4) row-major are in the mesh' own space; for Blender,
     pose_from_rest = object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world. The sum of the matrices
     times the weights is divided by the weights' sum; a vertex whose weights sum to no more than 0.0001 stays.
+    """
+
+def penetration(
+    body_positions: ArrayLike,
+    body_triangles: ArrayLike,
+    body_weights: Weights,
+    positions: ArrayLike,
+    weights: Weights,
+    pose_from_rest: ArrayLike,
+    *,
+    threads: int = 0,
+) -> NDArray[np.float32]:
+    """Depths (P, n) of a garment's vertices (n) below the closest triangle of a body, 0 outside, in each of P poses.
+
+    `body_positions` (V, 3) and `positions` (n, 3) are at rest, in world units; `body_triangles` (T, 3) wind so that
+    their normals face outward. `pose_from_rest` (P * B, 4, 4) has the B bones' matrices, one pose after the other.
     """
 
 def desparsify(
@@ -303,3 +319,205 @@ class SculptSolver:
 def simplex_qp(h: ArrayLike, g: ArrayLike, start: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
     """Minimises 1/2 w'Hw - g'w over w >= 0, sum w = sum of the start, for P problems of N <= 12 unknowns at once: the
     solver inside of a stroke. `h` (P, N, N) symmetric positive definite, `g` and `start` (P, N), starts feasible."""
+
+def biharmonic_embedding(
+    positions: ArrayLike, triangles: ArrayLike, *, n_pairs: int = 100, threads: int = 0
+) -> NDArray[np.float64]:
+    """Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance (Lipman et al. 2010,
+    doi:10.1145/1805964.1805971), from the smallest non-zero eigenpairs of the cotangent Laplacian: phi_k / lambda_k.
+
+    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too small
+    for are zero, and so are the rows of vertices without a triangle.
+    """
+
+@final
+class Retarget:
+    """Retargeted weights; every array has one entry per target vertex."""
+
+    @property
+    def weights(self) -> Weights:
+        """Over the target's bones."""
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """(V,) how far the match is to be believed, 0 to 1."""
+
+    @property
+    def matched(self) -> NDArray[np.bool_]:
+        """(V,) whether the vertex has the weights of its match; the others are filled from around them."""
+
+    @property
+    def points(self) -> NDArray[np.float32]:
+        """(V, 3) where on the source each vertex belongs."""
+
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+def retarget_weights(
+    source_positions: ArrayLike,
+    source_triangles: ArrayLike,
+    source_weights: Weights,
+    source_frames: ArrayLike,
+    source_lengths: ArrayLike,
+    target_positions: ArrayLike,
+    target_triangles: ArrayLike,
+    target_frames: ArrayLike,
+    target_lengths: ArrayLike,
+    *,
+    bone_map: ArrayLike,
+    method: Literal["skeleton", "biharmonic"] = "skeleton",
+    landmarks: ArrayLike | None = None,
+    max_influences: int = 0,
+    threads: int = 0,
+    source_parents: ArrayLike | None = None,
+    match_points: Literal["surface", "vertices"] = "surface",
+    registration: bool = False,
+    normal_length: float = 0.02,
+    max_distance: float = 0.08,
+    max_normal_angle: float = 1.3962634015954636,
+    max_stretch: float = 6.0,
+    n_pairs: int = 100,
+    smoothing_iterations: int = 0,
+    smoothing_factor: float = 0.2,
+) -> Retarget:
+    """Weights of one character for another with a matching skeleton.
+
+    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may stand,
+    face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's, negative for
+    none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor, by
+    `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
+    distance.
+
+    "skeleton" brings the target into the source's pose and proportions bone by bone and matches by position and normal;
+    "biharmonic" matches by biharmonic distances to `landmarks` (L, 2), a source and a target vertex each, to which the
+    bones add theirs (`n_pairs` eigenpairs per island). `match_points`: any point of the source's surface, or vertices
+    only. `registration` draws the target onto the source by smooth displacements first. Lengths are shares of the
+    source's bounding-box diagonal: normals that differ by a unit count as `normal_length` apart; matches farther than
+    `max_distance`, with normals more than `max_normal_angle` apart, or that stretch their surroundings more than
+    `max_stretch` times are filled from around them.
+    """
+
+def start_retarget_weights(
+    source_positions: ArrayLike,
+    source_triangles: ArrayLike,
+    source_weights: Weights,
+    source_frames: ArrayLike,
+    source_lengths: ArrayLike,
+    target_positions: ArrayLike,
+    target_triangles: ArrayLike,
+    target_frames: ArrayLike,
+    target_lengths: ArrayLike,
+    *,
+    bone_map: ArrayLike,
+    method: Literal["skeleton", "biharmonic"] = "skeleton",
+    landmarks: ArrayLike | None = None,
+    max_influences: int = 0,
+    threads: int = 0,
+    source_parents: ArrayLike | None = None,
+    match_points: Literal["surface", "vertices"] = "surface",
+    registration: bool = False,
+    normal_length: float = 0.02,
+    max_distance: float = 0.08,
+    max_normal_angle: float = 1.3962634015954636,
+    max_stretch: float = 6.0,
+    n_pairs: int = 100,
+    smoothing_iterations: int = 0,
+    smoothing_factor: float = 0.2,
+) -> Job:
+    """Starts `retarget_weights` on threads of its own; `Job.result` returns a `Retarget`."""
+@final
+class AutoWeights:
+    """Automatic weights: one row per vertex, none empty, each summing to 1."""
+
+    @property
+    def weights(self) -> Weights: ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
+        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
+        `seconds` by stage."""
+
+def automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> AutoWeights:
+    """Computes weights for the bones of an armature from scratch. Any mesh gets an answer at every vertex: open,
+    overlapping, of many islands, split at seams (coincident vertices get equal rows).
+
+    `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
+    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
+    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
+    """
+
+def start_automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> Job:
+    """The same as a job, whose result is an `AutoWeights`."""
+
+@final
+class Embedding:
+    """A skeleton embedded into a mesh, bone by bone."""
+
+    @property
+    def heads(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def tails(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """(B,): how far to trust each bone's head, 0 to 1."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
+        are outside of the mesh), `penalty`, `seconds`."""
+
+def embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial"] = "medial",
+    threads: int = 0,
+) -> Embedding:
+    """Puts the bones of a template into a mesh that has none.
+
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
+    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
+    needs the shape of the mesh only.
+    """
+
+def start_embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial"] = "medial",
+    threads: int = 0,
+) -> Job:
+    """The same as a job, whose result is an `Embedding`."""

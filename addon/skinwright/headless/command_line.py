@@ -15,6 +15,9 @@ from .. import declared, files, native
 from ..declared import SettingError
 from ..errors import Refused, internal
 from ..reporting import Report, SculptReport
+from ..retarget import RetargetParams, RetargetReport, retarget_weights
+from ..retarget import from_json as retarget_from_json
+from ..retarget import to_json as retarget_to_json
 from ..scene import blend_file
 from ..scene.blend_file import mesh_named, object_named
 from ..sculpt.params import SculptParams, options_from_json
@@ -24,7 +27,8 @@ from . import wardrobe as wardrobe_command
 from . import weights as weights_command
 
 DONE, FAILED, USAGE = 0, 1, 2
-Params = TransferParams | SculptParams
+Params = TransferParams | SculptParams | RetargetParams
+AnyReport = Report | SculptReport | RetargetReport
 
 
 class _Failure(Refused):
@@ -38,6 +42,7 @@ def main(arguments: list[str]) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
+    _add_retarget(commands.add_parser("retarget", help="take the weights of another character"))
     _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
     _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
     return _run(parser, arguments)
@@ -56,6 +61,14 @@ def sculpt(arguments: list[str]) -> int:
     description = "Turn recorded sculpts of a posed mesh into weights."
     parser = argparse.ArgumentParser(prog="sculpt_weights.py", description=description)
     _add_sculpt(parser)
+    return _run(parser, arguments)
+
+
+def retarget(arguments: list[str]) -> int:
+    """The same without the word `retarget`, for the script."""
+    description = "Take the weights of another character with a similar skeleton."
+    parser = argparse.ArgumentParser(prog="retarget_weights.py", description=description)
+    _add_retarget(parser)
     return _run(parser, arguments)
 
 
@@ -87,6 +100,16 @@ def _add_sculpt(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sculpts", required=True, type=Path, help=".npz file of positions and poses")
     _add_common(parser, SculptParams())
     parser.set_defaults(work=_sculpt, read=options_from_json, inputs=("settings", "sculpts"))
+
+
+def _add_retarget(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
+    parser.add_argument("--source", required=True, help="armature of the character whose weights are taken, or a mesh")
+    parser.add_argument(
+        "--target", required=True, action="append", help="mesh of the character that gets them; may be repeated"
+    )
+    _add_common(parser, RetargetParams())
+    parser.set_defaults(work=_retarget, read=retarget_from_json, inputs=("settings",))
 
 
 def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
@@ -167,7 +190,7 @@ def _value(text: str) -> Any:
         return text
 
 
-def _work(options: argparse.Namespace, params: Params) -> Report | SculptReport:
+def _work(options: argparse.Namespace, params: Params) -> AnyReport:
     if native.problem():
         raise _Failure(native.problem())
     _check_outputs(options)
@@ -196,14 +219,23 @@ def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
     )
 
 
+def _retarget(options: argparse.Namespace, params: RetargetParams) -> RetargetReport:
+    targets = [mesh_named(name) for name in options.target]
+    return retarget_weights(bpy.context, object_named(options.source), targets, params)
+
+
 def _sculpt(options: argparse.Namespace, params: SculptParams) -> SculptReport:
     return replay(mesh_named(options.target), read(options.sculpts), params)
 
 
-def _write_report(options: argparse.Namespace, params: Params, report: Report | SculptReport) -> None:
+def _write_report(options: argparse.Namespace, params: Params, report: AnyReport) -> None:
     if options.report:
-        content: dict[str, Any] = {"version": native.addon_version(), "settings": declared.to_json(params)}
+        content: dict[str, Any] = {"version": native.addon_version(), "settings": _shown(params)}
         files.write_report(options.report, content | report.to_json(), overwrite=options.overwrite)
+
+
+def _shown(params: Params) -> dict[str, Any]:
+    return retarget_to_json(params) if isinstance(params, RetargetParams) else declared.to_json(params)
 
 
 _commands: list[object] = []  # what Blender gives back for taking the command away

@@ -38,7 +38,7 @@ class MaskPainting:
         self.before = weight_state.capture(target)
         self.mask_group, self.overlay = target.skinwright.mask_group, settings.overlay.kind
         self.session = MatchSession(settings.transfer.source, target, params)
-        self.source = settings.transfer.source if params.add_armature else None
+        self.source = settings.transfer.source.name if params.add_armature else ""
         self.problem = ""
         # When weights were written, and how long after the mask had been seen to have changed.
         self.written_at: list[float] = []
@@ -55,11 +55,10 @@ class MaskPainting:
         group = mask.ensure(target)
         target.vertex_groups.active = target.vertex_groups[group]
         context.scene.skinwright.overlay.kind = "MATCH"
-        if self.source and armature.find(self.source) and armature.find(target) is None:
+        source = bpy.data.objects.get(self.source)
+        if source and armature.find(source) and armature.find(target) is None:
             # Else the artist would see no weight at work.
-            there = set(target.modifiers.keys())
-            armature.attach(target, self.source)
-            self._modifiers = [name for name in target.modifiers.keys() if name not in there]
+            self._modifiers = armature.attach(target, source)
 
     @property
     def armature_added(self) -> bool:

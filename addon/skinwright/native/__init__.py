@@ -115,6 +115,18 @@ class Job:
         return transfer, _rows(transfer.weights)
 
 
+def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
+    """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
+
+    Characters are positions, triangles, frames and lengths; `rows` are the source's over its bones.
+    """
+    positions, triangles, frames, lengths = source
+    with _naming(name):
+        weights = _module.Weights(*rows, len(lengths))
+        arrays = (positions, triangles, weights, frames, lengths, *target)
+        return Job(name, _module.start_retarget_weights(*arrays, **options))
+
+
 def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
     """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
     with _naming(name):
@@ -127,26 +139,24 @@ def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) 
         return _module.linear_blend(rest, _module.Weights(*rows, len(pose_from_rest)), pose_from_rest)
 
 
-class Surface:
-    """A surface, whose closest points are asked for."""
-
-    def __init__(self, name: str, positions: NDArray, triangles: NDArray) -> None:
-        self.name = name
-        self._corners = positions[triangles.astype(np.int64)].astype(np.float64)
-        n = len(positions)
-        one_column = (np.arange(n + 1, dtype=np.uint32), np.zeros(n, np.uint32), np.ones(n, np.float32))
-        with _naming(name):
-            self._source = _module.Source(positions, triangles, _module.Weights(*one_column, 1))
-
-    def depths(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
-        """(P,) how far points (P, 3) lie below their closest face, 0 outside."""
-        with _naming(self.name):
-            triangle, barycentric, _ = self._source.closest_points(points)
-        corners = self._corners[triangle]
-        closest = np.einsum("pc,pcx->px", barycentric, corners)
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
-        return np.maximum(np.einsum("px,px->p", normal, closest - points) / length, 0)
+def penetration(
+    name: str,
+    body: tuple[NDArray, NDArray, Rows],
+    garment: tuple[NDArray, Rows],
+    poses: NDArray,
+) -> NDArray[np.float32]:
+    """(P, n) depths of a garment's vertices inside a body in poses (P, B, 4, 4); arguments as in the stub."""
+    n_bones = poses.shape[1]
+    (positions, triangles, rows), (points, point_rows) = body, garment
+    with _naming(name):
+        return _module.penetration(
+            positions,
+            triangles,
+            _module.Weights(*rows, n_bones),
+            points,
+            _module.Weights(*point_rows, n_bones),
+            poses.reshape(-1, 4, 4),
+        )
 
 
 class SculptSolver:

@@ -1,6 +1,17 @@
 """Operators, one file or folder per feature."""
 
-from . import check_weights, desparsify, match, panel_buttons, presets, sculpt, stored_weights, transfer_weights
+from . import (
+    bone_map,
+    check_weights,
+    desparsify,
+    match,
+    panel_buttons,
+    presets,
+    retarget_weights,
+    sculpt,
+    stored_weights,
+    transfer_weights,
+)
 from .modal import keep_alive, timers, undo
 
 MODULES = (
@@ -15,4 +26,6 @@ MODULES = (
     *sculpt.MODULES,
     stored_weights,
     panel_buttons,
+    retarget_weights,
+    bone_map,
 )

@@ -3,13 +3,14 @@
 from bpy.props import BoolProperty
 from bpy.types import Context, Event, Object
 
-from .. import preferences
+from .. import jobs, preferences
 from ..registration import registration
 from ..reporting import Report
 from ..settings import TransferSettings
 from ..settings.properties import last_used
-from ..transfer import TransferParams, steps, transfer_weights
+from ..transfer import TransferParams, steps
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
+from .comparison import compared
 from .modal.long_work import LongWork
 
 # Below this a transfer takes less than the blink of a progress bar.
@@ -32,6 +33,12 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         options={"SKIP_SAVE"},
     )
 
+    compare: BoolProperty(
+        name="Check Before and After",
+        description="Count stretched, torn and opened vertices in test poses before and after, and report both",
+        default=False,
+    )
+
     @classmethod
     def refusal(cls, context: Context) -> str:
         """Mode, source and targets."""
@@ -46,7 +53,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         vertices = sum(len(target.data.vertices) for target in targets(context))
         if vertices < LONG_WORK_VERTICES or self.freeze:
             return self.execute(context)
-        return self.attempt(lambda: self.begin(context, steps(*self._inputs(context), before_write=self.keep_before)))
+        return self.attempt(lambda: self.begin(context, self._steps(context)))
 
     def draw(self, _context: Context) -> None:
         """The redo panel."""
@@ -58,6 +65,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
             layout.separator()
             draw(layout.column())
         layout.separator()
+        layout.prop(self, "compare")
         layout.prop(self, "freeze")
 
     def work(self, context: Context) -> set[str]:
@@ -65,12 +73,18 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         if self.freeze:
             self.report({"INFO"}, "Frozen: changes take effect once Freeze Operator is off")
             return {"FINISHED"}
-        return self.complete(context, transfer_weights(*self._inputs(context), before_write=self.keep_before))
+        return self.complete(context, jobs.wait(self._steps(context)))
 
     def complete(self, context: Context, report: Report) -> set[str]:
         """Say what was done, and leave what it was done with to the panel, the preview, the mask and the check."""
         last_used(self.properties, context.scene.skinwright.transfer, TransferSettings.__annotations__)
         return self.tell(report.sentence(), report.all_warnings())
+
+    def _steps(self, context: Context) -> jobs.Jobs[Report]:
+        inputs = self._inputs(context)
+        _, source, chosen, params = inputs
+        transfer = steps(*inputs, before_write=self.keep_before)
+        return compared(transfer, source, chosen, params.max_influences) if self.compare else transfer
 
     def _inputs(self, context: Context) -> tuple[Context, Object, list[Object], TransferParams]:
         params = self.to_params(preferences.threads(context))

@@ -15,6 +15,21 @@ INFLUENCES = np.array(
     np.float32,
 )
 
+# Sound, then by check.weight_check.Fault.
+FAULTS = np.array(
+    [
+        (0.75, 0.75, 0.75),
+        (0.1, 0.1, 0.1),
+        (0.94, 0.89, 0.26),
+        (0.8, 0.47, 0.65),
+        (0.9, 0.62, 0),
+        (0.84, 0.37, 0),
+        (0.65, 0, 0.1),
+        (0, 0.45, 0.7),
+    ],
+    np.float32,
+)
+
 # Pressed to half its length or less, as at rest, stretched to twice its length or more.
 STRETCH = np.array([(0.13, 0.4, 0.67), (0.57, 0.77, 0.87), (0.96, 0.96, 0.96), (0.96, 0.65, 0.51), (0.7, 0.09, 0.17)])
 
@@ -26,6 +41,8 @@ def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
     """(V, 3) of what a preview.Picture of this kind holds."""
     if kind == "MATCH":
         return of_categories(values)
+    if kind == "FAULTS":
+        return FAULTS[values]
     if kind == "DIFFERENCE":
         return of_difference(values)
     return of_influences(values) if kind == "INFLUENCES" else of_stretch(values)

@@ -7,6 +7,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..check import shown as checked
+from ..check.weight_check import Fault, WeightCheck
 from ..csr import Rows
 from ..match import explain
 from ..match import session as match_session
@@ -39,7 +41,7 @@ class Histogram:
 
 @dataclass(frozen=True)
 class Picture:
-    """`values` (V,) mean what `kind` says: a category, a number of influences, a logarithm of stretch."""
+    """`values` (V,) mean what `kind` says: a category, a number of influences, a logarithm of stretch, a fault."""
 
     kind: str
     object_name: str
@@ -71,7 +73,7 @@ def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Pi
     if obj is None:
         return None
     match = _match(obj, session, params) if session else None
-    key = (kind, obj.name, changes.version, id(match), id(comparing.current))
+    key = (kind, obj.name, changes.version, id(match), id(comparing.current), id(checked.of(obj)))
     if _kept is None or _kept[0] != key:
         _kept = (key, _make(context, kind, obj, session, match))
     return _kept[1]
@@ -118,6 +120,8 @@ def _make(
         return _picture_of_difference(obj, shape)
     if kind == "INFLUENCES":
         return _picture_of_influences(obj, shape)
+    if kind == "FAULTS":
+        return _picture_of_faults(checked.of(obj), shape)
     values = deformation.stretch(mesh.edges(obj), mesh.rest_positions(obj.data), positions)
     rows = [(-1, "Half as long"), (0, "As at rest"), (1, "Twice as long")]
     return Picture(**shape, values=values, rows=rows)
@@ -149,6 +153,20 @@ def histogram(label: str, unit: str, values: NDArray, threshold: float, high: fl
     kept = np.minimum(values[np.isfinite(values)], high)
     counts, _ = np.histogram(kept, HISTOGRAM_BINS, (0, high))
     return Histogram(label, unit, counts, high, threshold)
+
+
+def _picture_of_faults(result: WeightCheck | None, shape: dict) -> Picture:
+    """0 for a sound vertex, else the number of its worst fault, from 1."""
+    values = np.zeros(len(shape["positions"]), np.int64)
+    if result is None:
+        return Picture(**shape, values=values, rows=[], note="Check the weights first")
+    rows = [(0, f"Sound: {int((~result.any_fault()).sum()):,}")]
+    for number, fault in enumerate(Fault, 1):
+        values[result.faulty[fault]] = number
+        if result.faulty[fault].any():
+            rows.append((number, f"{fault.name.replace('_', ' ').title()}: {int(result.faulty[fault].sum()):,}"))
+    worst = f"Worst: {result.worst.name}" if result.worst else "No fault in any pose"
+    return Picture(**shape, values=values, rows=rows, note=worst)
 
 
 def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:

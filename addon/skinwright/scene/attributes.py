@@ -14,3 +14,13 @@ def write(obj: bpy.types.Object, name: str, values: NDArray) -> None:
     attribute = attributes.new(name, kind, "POINT")
     attribute.data.foreach_set("value", np.ascontiguousarray(values))
     obj.data.update()
+
+
+def write_colors(obj: bpy.types.Object, name: str, colors: NDArray[np.float32]) -> None:
+    """Store (V, 4) colors on the vertices, in place of an attribute of this name."""
+    attributes = obj.data.attributes
+    if name in attributes:
+        attributes.remove(attributes[name])
+    attribute = attributes.new(name, "FLOAT_COLOR", "POINT")
+    attribute.data.foreach_set("color", np.ascontiguousarray(colors).ravel())
+    obj.data.update()

@@ -5,6 +5,7 @@ from bpy.props import PointerProperty
 from bpy.types import Object, PropertyGroup, Scene
 
 from .overlay import SKINWRIGHT_PG_overlay
+from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
 from .transfer import SKINWRIGHT_PG_transfer, TransferSettings
@@ -18,6 +19,7 @@ class SKINWRIGHT_PG_scene(PropertyGroup):
     transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
     overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
     sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
+    retarget: PointerProperty(type=SKINWRIGHT_PG_retarget)
 
 
 CLASSES = (
@@ -25,6 +27,8 @@ CLASSES = (
     SKINWRIGHT_PG_object,
     SKINWRIGHT_PG_overlay,
     SKINWRIGHT_PG_sculpt,
+    SKINWRIGHT_PG_bone_pair,
+    SKINWRIGHT_PG_retarget,
     SKINWRIGHT_PG_scene,
 )
 

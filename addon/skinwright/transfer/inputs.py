@@ -175,7 +175,7 @@ def choose_groups(
         "BONE_SELECT": deforming.intersection(*[set().union(*(armature.selected_bones(rig) for rig in rigs))]),
     }[subset]
     # Where only a group's vertices follow an armature, the targets need that group.
-    wanted |= armature.masking_groups(source)
+    wanted = wanted | armature.masking_groups(source)
     chosen = [name for name in groups if name in wanted]
     if not set(chosen) - armature.masking_groups(source):
         kind = "selected deform bone" if subset == "BONE_SELECT" else "deform bone"

@@ -3,6 +3,7 @@
 import bpy
 from bpy.types import Context, Panel, UILayout
 
+from ..check import shown
 from ..match.painting import BRUSH_WEIGHTS, brush_value
 from ..match.session import current_of
 from .panel import Tab
@@ -102,9 +103,24 @@ class SKINWRIGHT_PT_check(Tab, Panel):
     bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, _context: Context) -> None:
-        """Its settings are in the redo panel."""
-        self.layout.operator("skinwright.check_weights", icon="CHECKMARK")
+    def draw(self, context: Context) -> None:
+        """The button, and what it found on the active mesh; its settings are in the redo panel."""
+        layout = self.layout
+        layout.operator("skinwright.check_weights", icon="CHECKMARK")
+        result = shown.of(context.object)
+        if result is None:
+            return
+        column = layout.column(align=True)
+        for fault, count in result.counts().items():
+            if count:
+                column.label(text=f"{count:,} {fault.value}")
+        if not any(result.counts().values()):
+            column.label(text=f"Nothing wrong in {len(result.poses)} poses")
+        if result.worst:
+            column.label(text=f"Worst: {result.worst.name}")
+            row = layout.row(align=True)
+            row.operator("skinwright.show_worst_pose", icon="POSE_HLT")
+            row.prop_enum(context.scene.skinwright.overlay, "kind", "FAULTS")
 
 
 CLASSES = (SKINWRIGHT_PT_match, SKINWRIGHT_PT_match_edit, SKINWRIGHT_PT_overlay, SKINWRIGHT_PT_check)

@@ -90,6 +90,27 @@ pub enum Error {
         /// A vertex of the offending block.
         vertex: usize,
     },
+    /// A bone that has no direction, no length or no finite place.
+    #[error("bone {bone} of the {what} {problem}")]
+    UnusableBone {
+        /// Which character.
+        what: &'static str,
+        /// Index of the bone.
+        bone: usize,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// No bone of one character has a partner in the other.
+    #[error(
+        "the two characters have no weighted bone in common: map at least one bone of the target to a bone of the source"
+    )]
+    NoCommonBones,
+    /// Bones that cannot be used.
+    #[error("the skeleton cannot be used: {reason}")]
+    InvalidSkeleton {
+        /// What is wrong, and what to do about it.
+        reason: String,
+    },
     /// A mesh without an inside for tetrahedra.
     #[error(
         "the mesh encloses nothing: no tetrahedron lies inside of it; it needs thickness, and normals that point outwards"

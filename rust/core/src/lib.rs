@@ -6,14 +6,19 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
+pub mod biharmonic;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
 pub mod fill;
 pub mod inside;
 pub mod laplacian;
 pub mod mesh;
+pub mod penetration;
 pub mod progress;
 pub mod refine;
+pub mod retarget;
 pub mod sculpt;
 pub mod skinning;
 pub mod surface;

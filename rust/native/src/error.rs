@@ -33,7 +33,11 @@ pub fn to_python(error: Error) -> PyErr {
         Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {
             InvalidWeights::new_err(sentence)
         }
-        Error::LengthMismatch { .. } | Error::InvalidParameter { .. } => InvalidParameter::new_err(sentence),
+        Error::LengthMismatch { .. }
+        | Error::InvalidParameter { .. }
+        | Error::InvalidSkeleton { .. }
+        | Error::UnusableBone { .. }
+        | Error::NoCommonBones => InvalidParameter::new_err(sentence),
         Error::NotPositiveDefinite { .. } => NotSolvable::new_err(sentence),
         Error::Cancelled => Cancelled::new_err(sentence),
     }

@@ -135,7 +135,7 @@ impl Inpainting {
         }
         let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer)))
+        Job::start(self.threads, work, move |py, transfer| Ok(Py::new(py, closest.present(py, transfer)?)?.into_any()))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other

@@ -7,42 +7,44 @@ use pyo3::prelude::*;
 use skinwright_core::Progress;
 
 use crate::error::{Outcome, SkinwrightError, finish, run};
-use crate::transfer::Transfer;
 
-type TransferOutcome = Outcome<skinwright_core::transfer::Transfer>;
-/// Turns the core's result into what Python gets.
-type Present = Box<dyn Fn(Python<'_>, skinwright_core::transfer::Transfer) -> PyResult<Transfer> + Send + Sync>;
+/// Turns what the core returned into what Python gets.
+type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
 
 /// Work going on on Rust's own threads; poll it from a timer.
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Job {
     progress: Arc<Progress>,
-    thread: Mutex<Option<JoinHandle<TransferOutcome>>>,
-    present: Present,
-    result: OnceLock<PyResult<Py<Transfer>>>,
+    thread: Mutex<Option<JoinHandle<Outcome<Present>>>>,
+    result: OnceLock<PyResult<Py<PyAny>>>,
 }
 
 impl Job {
-    /// Starts `work` on a thread of its own; inside, rayon runs on `threads` threads (0: all).
-    pub fn start(
+    /// Starts `work` on a thread of its own; inside, rayon runs on `threads` threads (0: all). `present` turns its result into a
+    /// Python object once somebody asks for it.
+    pub fn start<T: Send + 'static>(
         threads: usize,
-        work: impl FnOnce(&Progress) -> skinwright_core::Result<skinwright_core::transfer::Transfer> + Send + 'static,
-        present: Present,
+        work: impl FnOnce(&Progress) -> skinwright_core::Result<T> + Send + 'static,
+        present: impl FnOnce(Python<'_>, T) -> PyResult<Py<PyAny>> + Send + 'static,
     ) -> PyResult<Self> {
         let progress = Arc::new(Progress::default());
         let seen = Arc::clone(&progress);
-        let thread = std::thread::Builder::new().spawn(move || run(threads, move || work(&seen)));
+        let presented = move |seen: &Progress| {
+            let result = work(seen)?;
+            Ok(Box::new(move |py: Python<'_>| present(py, result)) as Present)
+        };
+        let thread = std::thread::Builder::new().spawn(move || run(threads, move || presented(&seen)));
         let thread = thread.map_err(|error| SkinwrightError::new_err(format!("no thread can be started: {error}")))?;
-        Ok(Self { progress, thread: Mutex::new(Some(thread)), present, result: OnceLock::new() })
+        Ok(Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() })
     }
 
-    fn wait(&self, py: Python<'_>) -> PyResult<Py<Transfer>> {
+    fn wait(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let thread = self.thread.lock().expect("never poisoned").take();
         let Some(thread) = thread else {
             return Err(SkinwrightError::new_err("another thread is waiting for this job"));
         };
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
-        Py::new(py, (self.present)(py, finish(outcome)?)?)
+        finish(outcome)?(py)
     }
 }
 
@@ -67,13 +69,13 @@ impl Job {
     }
 
     /// Waits for the work and returns what it gave, or raises its error. May be called again.
-    fn result(&self, py: Python<'_>) -> PyResult<Py<Transfer>> {
+    fn result(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         if self.result.get().is_none() {
             let result = self.wait(py);
             let _ = self.result.set(result);
         }
         match self.result.get().expect("just set") {
-            Ok(transfer) => Ok(transfer.clone_ref(py)),
+            Ok(result) => Ok(result.clone_ref(py)),
             Err(error) => Err(error.clone_ref(py)),
         }
     }

@@ -1,14 +1,19 @@
 //! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
+mod autoskin;
+mod biharmonic;
 mod desparsify;
+mod embed;
 mod error;
 mod fill;
 mod inpainting;
 mod job;
 mod memory;
+mod penetration;
 mod ranges;
 mod refine;
+mod retarget;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -22,7 +27,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod skinwright_native {
     #[pymodule_export]
+    use crate::autoskin::{AutoWeights, automatic_weights, start_automatic_weights};
+    #[pymodule_export]
+    use crate::biharmonic::biharmonic_embedding;
+    #[pymodule_export]
     use crate::desparsify::desparsify;
+    #[pymodule_export]
+    use crate::embed::{Embedding, embed_skeleton, start_embed_skeleton};
     #[pymodule_export]
     use crate::error::{
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
@@ -36,7 +47,11 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::memory::set_memory_budget;
     #[pymodule_export]
+    use crate::penetration::penetration;
+    #[pymodule_export]
     use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
+    use crate::retarget::{Retarget, retarget_weights, start_retarget_weights};
     #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]

@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod accuracy;
+pub mod eigen;
 mod fronts;
 mod kernels;
 mod ordering;

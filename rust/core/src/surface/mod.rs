@@ -7,6 +7,7 @@ mod lanes;
 mod morton;
 mod nearest;
 mod node;
+mod oriented;
 mod search;
 
 use glam::Vec3;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::mesh::TriMesh;
 use bvh::Bvh;
+pub use oriented::{OrientedPoint, OrientedSurface};
 use search::Batch;
 
 /// Queries that one task answers; within a task each search starts from the last one's answer.

@@ -1,0 +1,158 @@
+"""What a retargeting reads from the two characters, each of which may have several meshes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import csr
+from ..csr import Rows
+from ..scene import armature, mesh, rest_bones, sculpting, vertex_groups
+from ..scene.error import SceneError
+from ..scene.rest_bones import RestBones
+from . import bone_map
+from .bone_map import BoneMatch
+from .params import RetargetParams
+
+
+@dataclass(frozen=True)
+class Character:
+    """An armature, its deforming bones, and meshes laid end to end: vertices of the k-th are starts[k] to starts[k + 1]."""
+
+    armature: bpy.types.Object
+    bones: RestBones
+    meshes: list[bpy.types.Object]
+    positions: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    starts: list[int]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both characters, the source's rows over its bones, the match of each bone of the target, and landmarks (L, 2)."""
+
+    source: Character
+    target: Character
+    rows: Rows
+    matches: list[BoneMatch]
+    landmarks: NDArray[np.uint32]
+
+    @property
+    def bone_map(self) -> NDArray[np.int64]:
+        """(B_target,) the source's bone for each of the target's, -1 for none."""
+        index = {name: i for i, name in enumerate(self.source.bones.names)}
+        return np.array([index.get(entry.source, -1) for entry in self.matches], np.int64)
+
+
+def read_pair(
+    context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: RetargetParams
+) -> Pair:
+    """Read and check both. Raises SceneError with the object, the problem and the cure."""
+    giver = _source(context, source)
+    taker = _target(targets)
+    if giver.armature == taker.armature:
+        raise SceneError(
+            f"{giver.armature.name} deforms the source and the target: use Transfer Weights between meshes of one armature"
+        )
+    for obj in targets:
+        sculpting.check_editable(obj)
+    rows = _rows(giver)
+    matches = match_bones(giver.bones, taker.bones, params)
+    if not any(entry.source for entry in matches):
+        raise SceneError(
+            f"No deforming bone of {taker.armature.name} has a partner in {giver.armature.name}: "
+            "pair at least one in the bone map"
+        )
+    return Pair(giver, taker, rows, matches, _landmarks(giver, taker, params))
+
+
+def match_bones(source: RestBones, target: RestBones, params: RetargetParams) -> list[BoneMatch]:
+    """By the map of `params`, then by name and place. Raises SceneError for a name that is no bone."""
+    for name, partner in params.bone_map.items():
+        for bone, bones, whose in ((name, target, "target"), (partner, source, "source")):
+            if bone and bone not in bones.names:
+                raise SceneError(f"The bone map names {bone}, but the {whose} has no deforming bone of that name")
+    return bone_map.match(source, target, params.bone_map)
+
+
+def rest_bones_of(rig: bpy.types.Object) -> RestBones:
+    """The deforming bones in the armature's order. Raises SceneError if there is none."""
+    deforming = armature.deform_bones(rig)
+    names = [bone.name for bone in rig.data.bones if bone.name in deforming]
+    if not names:
+        raise SceneError(f"{rig.name} has no bone that deforms: turn Deform on for some")
+    return rest_bones.read(rig, names)
+
+
+def _source(context: bpy.types.Context, source: bpy.types.Object) -> Character:
+    rig = source if source.type == "ARMATURE" else armature.find(source)
+    if rig is None:
+        raise SceneError(f"{source.name} has no armature: pick the source's armature, or give it an Armature modifier")
+    meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups]
+    if not meshes:
+        raise SceneError(f"{rig.name} deforms no mesh that has weights: pick the armature of a skinned character")
+    return _character(rig, meshes)
+
+
+def _target(targets: Sequence[bpy.types.Object]) -> Character:
+    rigs = {obj.name: armature.find(obj) for obj in targets}
+    for name, rig in rigs.items():
+        if rig is None:
+            raise SceneError(f"{name} has no armature: give it an Armature modifier with the skeleton it shall follow")
+    if len(set(rigs.values())) > 1:
+        raise SceneError(
+            f"{targets[0].name} and {next(n for n in rigs if rigs[n] != rigs[targets[0].name])} follow different "
+            "armatures: select the meshes of one character"
+        )
+    rig = rigs[targets[0].name]
+    assert rig is not None
+    return _character(rig, list(targets))
+
+
+def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:
+    read = [mesh.read(obj) for obj in meshes]
+    starts = np.cumsum([0, *(len(geometry.positions) for geometry in read)], dtype=np.int64).tolist()
+    return Character(
+        armature=rig,
+        bones=rest_bones_of(rig),
+        meshes=meshes,
+        positions=np.concatenate([geometry.positions for geometry in read]),
+        triangles=np.concatenate(
+            [geometry.triangles + np.uint32(start) for geometry, start in zip(read, starts[:-1], strict=True)]
+        ),
+        starts=starts,
+    )
+
+
+def _rows(source: Character) -> Rows:
+    parts = [vertex_groups.read(obj, source.bones.names) for obj in source.meshes]
+    offsets = np.cumsum([0, *(len(part.bones) for part in parts)], dtype=np.int64)
+    indptr = [part.indptr[1:] + np.uint32(start) for part, start in zip(parts, offsets, strict=False)]
+    rows = Rows(
+        np.concatenate([np.zeros(1, np.uint32), *indptr]),
+        np.concatenate([part.bones for part in parts]),
+        np.concatenate([part.values for part in parts]),
+    )
+    if not csr.row_sums(rows).any():
+        names = ", ".join(obj.name for obj in source.meshes)
+        raise SceneError(f"{names}: no vertex follows a deforming bone of {source.armature.name}; paint weights first")
+    return rows
+
+
+def _landmarks(source: Character, target: Character, params: RetargetParams) -> NDArray[np.uint32]:
+    pairs = [
+        (_vertex(source, source_name, i), _vertex(target, target_name, j))
+        for source_name, i, target_name, j in params.landmarks
+    ]
+    return np.array(pairs, np.uint32).reshape(-1, 2)
+
+
+def _vertex(character: Character, name: str, vertex: int) -> int:
+    for obj, start, end in zip(character.meshes, character.starts, character.starts[1:], strict=False):
+        if obj.name == name:
+            if not 0 <= vertex < end - start:
+                raise SceneError(f"A landmark names vertex {vertex} of {name}, which has {end - start}")
+            return start + vertex
+    raise SceneError(f"A landmark names {name}, which is no mesh of {character.armature.name}")

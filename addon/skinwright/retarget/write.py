@@ -1,0 +1,120 @@
+"""The one place where a retargeting changes the scene."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import csr
+from ..scene import attributes, vertex_groups, weight_state
+from .compute import Result
+from .inputs import Character, Pair
+from .params import RetargetParams
+from .report import RetargetReport
+
+ATTRIBUTE = "Correspondence"
+_FEW = 8
+
+
+def write(
+    pair: Pair,
+    result: Result,
+    params: RetargetParams,
+    before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
+) -> RetargetReport:
+    """Write every mesh of the target, or none. Locked groups and groups that are not bones stay as they are."""
+    if before_write:
+        before_write(pair.target.meshes)
+    warnings = _warnings(pair, result)
+    with weight_state.all_or_nothing(pair.target.meshes):
+        for obj, start, end in _parts(pair.target):
+            warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
+        if params.show_correspondence:
+            _show(pair, result)
+    return _report(pair, result, warnings)
+
+
+def _parts(character: Character) -> list[tuple[bpy.types.Object, int, int]]:
+    return list(zip(character.meshes, character.starts[:-1], character.starts[1:], strict=True))
+
+
+def _write_mesh(pair: Pair, obj: bpy.types.Object, rows: csr.Rows) -> list[str]:
+    names = pair.target.bones.names
+    locks = vertex_groups.locked(obj)
+    present = {group.name for group in obj.vertex_groups}
+    used = np.bincount(rows.bones, minlength=len(names)) > 0
+    written = np.array([name not in locks for name in names], bool)
+    written &= used | np.array([name in present for name in names], bool)
+    kept = [name for name, is_written in zip(names, written, strict=True) if is_written]
+    vertices = np.flatnonzero(np.diff(rows.indptr) > 0)
+    vertex_groups.write(obj, kept, csr.take_rows(csr.take_columns(rows, written), vertices), vertices)
+    locked = sorted(locks & set(names))
+    if not locked:
+        return []
+    return [f"{obj.name}: locked groups were left as they are, so weights may not sum to 1: {_listed(locked)}"]
+
+
+def _warnings(pair: Pair, result: Result) -> list[str]:
+    warnings = []
+    alone = [entry.target for entry in pair.matches if not entry.source]
+    if alone:
+        warnings.append(f"Bones of {pair.target.armature.name} without a partner get no weight: {_listed(alone)}")
+    heirs = [f"{bone} to {heir}" for bone, heir in _inherited(pair, result)]
+    if heirs:
+        warnings.append(f"Bones of {pair.source.armature.name} without a partner gave their share: {_listed(heirs)}")
+    unsure = [entry.target for entry in pair.matches if entry.source and entry.confidence < 0.5]
+    if unsure:
+        warnings.append(f"Bones paired by their place only, look at the bone map: {_listed(unsure)}")
+    unweighted = result.retarget.report["unweighted"]
+    if unweighted:
+        warnings.append(
+            f"{unweighted} vertices have no weight, as the source has none there; they were left as they were"
+        )
+    return warnings
+
+
+def _inherited(pair: Pair, result: Result) -> list[tuple[str, str]]:
+    names = pair.source.bones.names
+    return [(names[bone], names[heir]) for bone, heir in result.retarget.report["inherited"]]
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - _FEW} more" if len(names) > _FEW else ""
+    return ", ".join(names[:_FEW]) + more
+
+
+def _show(pair: Pair, result: Result) -> None:
+    """Colors that say where a vertex lies in the source's bounding box, on both characters."""
+    low = pair.source.positions.min(axis=0)
+    size = np.maximum(np.ptp(pair.source.positions, axis=0), 1e-12)
+    for character, points in ((pair.source, pair.source.positions), (pair.target, result.retarget.points)):
+        colors = _colors((points - low) / size)
+        for obj, start, end in _parts(character):
+            attributes.write_colors(obj, ATTRIBUTE, colors[start:end])
+
+
+def _colors(places: NDArray[np.float32]) -> NDArray[np.float32]:
+    opaque = np.ones((len(places), 4), np.float32)
+    opaque[:, :3] = np.clip(places, 0, 1)
+    return opaque
+
+
+def _report(pair: Pair, result: Result, warnings: list[str]) -> RetargetReport:
+    native = result.retarget.report
+    return RetargetReport(
+        source=pair.source.armature.name,
+        target=pair.target.armature.name,
+        meshes=[obj.name for obj in pair.target.meshes],
+        vertices=native["vertices"],
+        matched=native["matched"],
+        filled=native["filled"],
+        unweighted=native["unweighted"],
+        confidence=round(float(result.retarget.confidence.mean()), 4),
+        bone_map=[asdict(entry) for entry in pair.matches],
+        inherited=_inherited(pair, result),
+        landmarks=native["landmarks"],
+        seconds=dict(native["seconds"]),
+        warnings=warnings,
+    )

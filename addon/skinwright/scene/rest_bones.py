@@ -1,0 +1,47 @@
+"""Bones at rest in the world: frames, lengths, names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from . import armature
+
+
+@dataclass(frozen=True)
+class RestBones:
+    """Bones (B): frames (B, 4, 4) with the bone along +Y and lengths (B,) in world units, parents (B,), -1 for none."""
+
+    names: list[str]
+    frames: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    parents: NDArray[np.int32]
+
+    @property
+    def heads(self) -> NDArray[np.float64]:
+        """(B, 3)."""
+        return self.frames[:, :3, 3]
+
+    @property
+    def tails(self) -> NDArray[np.float64]:
+        """(B, 3)."""
+        return self.heads + self.frames[:, :3, 1] * self.lengths[:, None]
+
+
+def read(rig: bpy.types.Object, names: Sequence[str]) -> RestBones:
+    """The bones of these names as the armature rests now, where its object stands."""
+    world = np.array(rig.matrix_world, np.float64)
+    local = np.array([rig.data.bones[name].matrix_local for name in names], np.float64).reshape(-1, 4, 4)
+    frames = world @ local
+    scale = np.linalg.norm(frames[:, :3, 1], axis=1)
+    own = np.array([rig.data.bones[name].length for name in names], np.float64)
+    frames[:, :3, :3] /= np.maximum(np.linalg.norm(frames[:, :3, :3], axis=1, keepdims=True), 1e-30)
+    return RestBones(list(names), frames, own * scale, armature.parents(rig, names))
+
+
+def meshes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The scene's meshes that an armature deforms, by name."""
+    found = [obj for obj in scene.objects if obj.type == "MESH" and armature.find(obj) == rig]
+    return sorted(found, key=lambda obj: obj.name)

@@ -1,0 +1,90 @@
+"""Retarget Weights in the Weights tab: source, bone map, settings, button."""
+
+from typing import Any
+
+from bpy.types import Context, Panel, UILayout, UIList
+
+from .. import jobs
+from ..registration import registration
+from .panel import Tab
+
+# Partners less sure than this are marked.
+UNSURE = 0.5
+
+
+class SKINWRIGHT_UL_bone_map(UIList):
+    """The bones of the target; those without a sure partner are marked."""
+
+    def draw_item(
+        self, context: Context, layout: UILayout, _settings: Any, entry: Any, _icon: int, *_more: Any
+    ) -> None:
+        """Bone, partner, confidence."""
+        sure = entry.source and (entry.source != entry.found or entry.confidence >= UNSURE)
+        row = layout.row(align=True)
+        row.label(text=entry.name, icon="BONE_DATA" if sure else "ERROR")
+        source = context.scene.skinwright.retarget.source
+        if source:
+            row.prop_search(entry, "source", source.data, "bones", text="")
+        edited = entry.source != entry.found
+        row.label(text="edited" if edited else f"{entry.confidence:.0%}" if entry.source else entry.how)
+
+
+class SKINWRIGHT_PT_retarget(Tab, Panel):
+    """Source and button; all else has a default that does."""
+
+    bl_label = "Retarget Weights"
+    bl_order = 4
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        """As the transfer's panel."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.scene.skinwright.retarget, "source")
+        if jobs.running:
+            layout.progress(factor=jobs.running.progress, text=f"{jobs.running.progress:.0%}, Esc stops")
+        layout.operator("skinwright.retarget_weights", icon="MOD_ARMATURE")
+
+
+class SKINWRIGHT_PT_retarget_bones(Tab, Panel):
+    """Which bone is which."""
+
+    bl_label = "Bone Map"
+    bl_parent_id = "SKINWRIGHT_PT_retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        """The list, and what fills and keeps it."""
+        settings = context.scene.skinwright.retarget
+        self.layout.operator("skinwright.match_bones", icon="FILE_REFRESH")
+        if settings.bone_map:
+            self.layout.label(text=settings.bone_map_of)
+            self.layout.template_list(
+                "SKINWRIGHT_UL_bone_map", "", settings, "bone_map", settings, "bone_map_index", rows=6
+            )
+        row = self.layout.row(align=True)
+        row.operator("skinwright.bone_map_load", text="Load", icon="IMPORT")
+        row.operator("skinwright.bone_map_save", text="Save", icon="EXPORT")
+
+
+class SKINWRIGHT_PT_retarget_settings(Tab, Panel):
+    """How vertices are matched and rows written."""
+
+    bl_label = "Matching and Writing"
+    bl_parent_id = "SKINWRIGHT_PT_retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        """As the operator lays them out."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        context.scene.skinwright.retarget.draw_settings(self.layout)
+
+
+register, unregister = registration(
+    SKINWRIGHT_UL_bone_map,
+    SKINWRIGHT_PT_retarget,
+    SKINWRIGHT_PT_retarget_bones,
+    SKINWRIGHT_PT_retarget_settings,
+)

@@ -1,0 +1,241 @@
+//! Both characters checked and welded, and the steps that need both.
+
+use glam::{DVec3, Vec3};
+
+use super::biharmonic::{Described, blends, check_landmarks, landmarks_of_matches};
+use super::matching::{Lengths, Match, Matching};
+use super::registration::register;
+use super::rows::{Row, blended};
+use super::shares::Shares;
+use super::skeleton::{BonePair, RestBone, pairs};
+use super::warp::Warp;
+use super::welded::Welded;
+use super::{Character, Correspondence, Landmark, Report, Settings};
+use crate::adjacency::Islands;
+use crate::biharmonic::BiharmonicEmbedding;
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::weights::Weights;
+
+/// Length over which normals are smoothed, as a share of the source's diagonal.
+const NORMAL_SMOOTHING: f64 = 0.02;
+/// How far vertices follow the weights of their first match.
+const FOLLOW: f64 = 0.5;
+
+/// Everything that is known before the first vertex is matched.
+#[derive(Debug)]
+pub(super) struct Prepared<'a> {
+    characters: [Character<'a>; 2],
+    weights: &'a Weights,
+    correspondence: Correspondence<'a>,
+    settings: &'a Settings,
+    /// Pairs whose source bone holds weight: they guide the warp.
+    guides: Vec<BonePair>,
+    shares: Shares<'a>,
+    warp: Warp,
+    source: Welded,
+    /// The target's distinct positions.
+    pub target: Welded,
+    /// Diagonal of the source.
+    pub size: f64,
+}
+
+/// The target in the source's pose, and the match of each of its distinct positions (U).
+#[derive(Debug)]
+pub(super) struct Placed {
+    pub positions: Vec<DVec3>,
+    /// Smooth normals of both sides, in the source's pose.
+    pub normals: Vec<Vec3>,
+    pub source_normals: Vec<Vec3>,
+    pub matches: Vec<Match>,
+}
+
+impl<'a> Prepared<'a> {
+    pub fn new(
+        source: Character<'a>,
+        weights: &'a Weights,
+        target: Character<'a>,
+        correspondence: Correspondence<'a>,
+        settings: &'a Settings,
+    ) -> Result<Self> {
+        settings.check()?;
+        check_weights(source, weights)?;
+        check_landmarks(correspondence.landmarks, source.mesh.vertex_count(), target.mesh.vertex_count())?;
+        let pairs = pairs(correspondence.bone_map, source.skeleton, target.skeleton)?;
+        let parents = correspondence.source_parents;
+        if let Some(found) = parents.map(<[i64]>::len).filter(|&found| found != source.skeleton.bones().len()) {
+            let expected = source.skeleton.bones().len();
+            return Err(Error::LengthMismatch { what: "source_parents", found, expected });
+        }
+        let weighted = weighted_bones(weights);
+        let guides: Vec<BonePair> = pairs.iter().filter(|pair| weighted[pair.source as usize]).copied().collect();
+        if guides.is_empty() {
+            return Err(Error::NoCommonBones);
+        }
+        Ok(Self {
+            shares: Shares::new(&pairs, source.skeleton, target.skeleton, parents, &weighted),
+            warp: Warp::new(&guides, source.skeleton, target.skeleton),
+            size: source.mesh.diagonal(),
+            source: Welded::new(&source.mesh),
+            target: Welded::new(&target.mesh),
+            characters: [source, target],
+            weights,
+            correspondence,
+            settings,
+            guides,
+        })
+    }
+
+    /// What is known before the work starts.
+    pub fn report(&self) -> Report {
+        let without = |(target, source): (u32, &i64)| (*source < 0).then_some(target);
+        Report {
+            vertices: self.target.of_vertex.len(),
+            bones: self.guides.len(),
+            size_ratio: self.warp.across(),
+            inherited: self.shares.inherited.clone(),
+            without_partner: (0..).zip(self.correspondence.bone_map).filter_map(without).collect(),
+            ..Report::default()
+        }
+    }
+
+    /// Warps, registers and matches the target.
+    pub fn place(&self, progress: &Progress) -> Result<Placed> {
+        let triangles = self.characters[0].mesh.triangles();
+        let points = self.settings.match_points;
+        let lengths =
+            Lengths { normal: self.settings.normal_length * self.size, smoothing: NORMAL_SMOOTHING * self.size };
+        let mut positions = self.warp.apply(&self.target.positions);
+        let matching = Matching::new(&self.source, triangles, &self.target, &positions, points, lengths)?;
+        progress.report(0.05);
+        progress.check()?;
+        self.follow_weights(&matching, &mut positions)?;
+        progress.report(0.1);
+        progress.check()?;
+        if self.settings.registration {
+            positions = register(&matching, &self.target.triangles, positions, self.size, progress)?;
+        }
+        let (matches, normals) = matching.closest(&positions)?;
+        progress.report(0.7);
+        progress.check()?;
+        let source_normals = matching.source_normals().to_vec();
+        Ok(Placed { positions, normals, source_normals, matches })
+    }
+
+    /// Moves each vertex halfway to where the weights of its match would carry it: the nearest bones change abruptly between
+    /// limbs, painted weights do not.
+    fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
+        let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);
+        let mut guide_of = vec![None; self.characters[1].skeleton.bones().len()];
+        (0..).zip(&self.guides).for_each(|(k, guide)| guide_of[guide.target as usize] = Some(k));
+        let carried = self.warp.apply_weighted(&self.target.positions, &rows, &guide_of);
+        positions.iter_mut().zip(carried).for_each(|(position, carried)| *position = position.lerp(carried, FOLLOW));
+        Ok(())
+    }
+
+    /// The weights of each match over the target's bones (U).
+    pub fn rows_of(&self, matches: &[Match]) -> Vec<Row> {
+        let corners = matches.iter().map(|at| std::iter::zip(at.corners, at.barycentric));
+        let row = |(blend, &position): (_, &DVec3)| blended(blend, self.weights, &self.shares, position);
+        corners.zip(&self.target.positions).map(row).collect()
+    }
+
+    /// Replaces rows (U) of islands with landmarks by those of the biharmonic matching. Returns the numbers of landmarks and
+    /// of vertices concerned.
+    pub fn replace_by_landmarks(
+        &self,
+        placed: &Placed,
+        rows: &mut [Row],
+        progress: &Progress,
+    ) -> Result<(usize, usize)> {
+        let [source, target] = self.characters;
+        let landmarks = self.landmarks(placed);
+        let spectra = [source, target].map(|c| BiharmonicEmbedding::new(&c.mesh, self.settings.n_pairs, progress));
+        let [source_spectrum, target_spectrum] = spectra;
+        let (source_spectrum, target_spectrum) = (source_spectrum?, target_spectrum?);
+        let islands = [source, target].map(|c| Islands::new(c.mesh.triangles(), c.mesh.vertex_count()));
+        let source_normals = self.source.spread(&placed.source_normals);
+        let target_normals = self.target.spread(&placed.normals);
+        let regions = [(&self.source, 0), (&self.target, 1)].map(|(welded, side)| self.regions(welded, side));
+        let blends = blends(
+            &Described {
+                embedding: &source_spectrum,
+                islands: islands[0].of_vertex(),
+                normals: &source_normals,
+                regions: &regions[0],
+            },
+            &Described {
+                embedding: &target_spectrum,
+                islands: islands[1].of_vertex(),
+                normals: &target_normals,
+                regions: &regions[1],
+            },
+            &landmarks,
+        );
+        progress.check()?;
+        let mut count = 0;
+        for (blend, &u) in std::iter::zip(blends, &self.target.of_vertex) {
+            if let Some(blend) = blend {
+                let position = self.target.positions[u as usize];
+                rows[u as usize] = blended(blend.into_iter(), self.weights, &self.shares, position);
+                count += 1;
+            }
+        }
+        Ok((landmarks.len(), count))
+    }
+
+    /// Those of the artist, and one beside the head of each bone that guides.
+    fn landmarks(&self, placed: &Placed) -> Vec<Landmark> {
+        let head = |pair: &BonePair| self.characters[1].skeleton.bones()[pair.target as usize].head;
+        let squared = |u: &usize, head: DVec3| self.target.positions[*u].distance_squared(head);
+        let nearest = |head: DVec3| {
+            (0..self.target.positions.len()).min_by(|a, b| squared(a, head).total_cmp(&squared(b, head))).unwrap_or(0)
+        };
+        let beside: Vec<usize> = self.guides.iter().map(|pair| nearest(head(pair))).collect();
+        let vertices: Vec<u32> = beside.iter().map(|&u| self.target.first[u]).collect();
+        let matches: Vec<Match> = beside.iter().map(|&u| placed.matches[u]).collect();
+        let mut landmarks = self.correspondence.landmarks.to_vec();
+        landmarks.extend(landmarks_of_matches(&vertices, &matches));
+        landmarks
+    }
+
+    /// The nearest two guides of each vertex; `side` 0 is the source, 1 the target.
+    fn regions(&self, welded: &Welded, side: usize) -> Vec<[u32; 2]> {
+        let bones = self.characters[side].skeleton.bones();
+        let bone = |pair: &BonePair| bones[[pair.source, pair.target][side] as usize];
+        let guides: Vec<RestBone> = self.guides.iter().map(bone).collect();
+        let nearest = |&p: &DVec3| {
+            let mut best = [(f64::INFINITY, 0); 2];
+            for (k, bone) in (0..).zip(&guides) {
+                let entry = (bone.distance(p), k);
+                if entry.0 < best[0].0 {
+                    best = [entry, best[0]];
+                } else if entry.0 < best[1].0 {
+                    best[1] = entry;
+                }
+            }
+            best.map(|(_, k)| k)
+        };
+        welded.spread(&welded.positions.iter().map(nearest).collect::<Vec<_>>())
+    }
+}
+
+fn check_weights(source: Character<'_>, weights: &Weights) -> Result<()> {
+    let (found, expected) = (weights.vertex_count(), source.mesh.vertex_count());
+    if found != expected {
+        return Err(Error::LengthMismatch { what: "source weights", found, expected });
+    }
+    let (found, expected) = (weights.n_bones() as usize, source.skeleton.bones().len());
+    if found != expected {
+        return Err(Error::LengthMismatch { what: "source frames", found: expected, expected: found });
+    }
+    weights.check_not_negative()
+}
+
+/// Which bones hold any weight.
+fn weighted_bones(weights: &Weights) -> Vec<bool> {
+    let mut weighted = vec![false; weights.n_bones() as usize];
+    let entries = std::iter::zip(weights.bones(), weights.values());
+    entries.filter(|(_, value)| **value > 0.0).for_each(|(&bone, _)| weighted[bone as usize] = true);
+    weighted
+}

@@ -1,0 +1,179 @@
+"""Retargeting between two characters of several meshes: what is written, what stays, undo of failures, refusals."""
+
+import json
+
+import builders
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+
+pytestmark = pytest.mark.usefixtures("native", "scene")
+ARM = ("Upper.L", "Lower.L", "Hand.L")
+
+
+def limb(name, names=ARM, *, length=3.0, radius=0.3, around=12, along=24, at=(0, 0, 0), part=None):
+    """An armature of three bones along z and a tube on it; `part` keeps a share of the rings in a mesh of its own."""
+    rig = bpy.data.objects.new(f"{name} Rig", bpy.data.armatures.new(name))
+    bpy.context.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for index, bone in enumerate(names):
+        edit_bone = rig.data.edit_bones.new(bone)
+        edit_bone.head, edit_bone.tail = (0, 0, index * length / 3), (0, 0, (index + 1) * length / 3)
+        edit_bone.parent, parent = parent, edit_bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.location = at
+    parts = [(0, along)] if part is None else [(0, part), (part, along)]
+    meshes = [_tube(f"{name} {k}", rig, length, radius, around, along, rings) for k, rings in enumerate(parts)]
+    bpy.context.view_layer.update()
+    return rig, meshes
+
+
+def _tube(name, rig, length, radius, around, along, rings):
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    heights = np.linspace(0, length, along + 1)[rings[0] : rings[1] + 1]
+    positions = [(radius * np.cos(a), 0.7 * radius * np.sin(a), z) for z in heights for a in angle]
+    quad = [
+        (k * around + s, k * around + (s + 1) % around, (k + 1) * around + (s + 1) % around, (k + 1) * around + s)
+        for k in range(len(heights) - 1)
+        for s in range(around)
+    ]
+    obj = builders.mesh(name, positions, quad)
+    obj.parent = rig
+    obj.modifiers.new("Armature", "ARMATURE").object = rig
+    return obj
+
+
+def truth(obj, length):
+    """(V, 3): each bone's share falls linearly around the middle of its neighbours."""
+    height = np.array([vertex.co.z for vertex in obj.data.vertices]) / length * 3
+    shares = np.stack([np.clip(1 - abs(height - 0.5 - j), 0, 1) for j in range(3)], 1)
+    shares[height < 0.5], shares[height > 2.5] = (1, 0, 0), (0, 0, 1)
+    return shares
+
+
+@pytest.fixture
+def man():
+    rig, meshes = limb("Man", part=10)
+    for obj in meshes:
+        shares = truth(obj, 3.0)
+        builders.paint(obj, **{name.replace(".", "__"): shares[:, j] for j, name in enumerate(ARM)})
+    bpy.context.scene.skinwright.retarget.source = rig
+    return rig
+
+
+@pytest.fixture
+def child():
+    return limb("Child", length=2.0, radius=0.25, around=16, along=30, at=(4, 1, 0), part=12)
+
+
+def retarget(meshes, **settings):
+    builders.select(*meshes)
+    return bpy.ops.skinwright.retarget_weights(**settings)
+
+
+def error_of(obj, names, length):
+    return 0.5 * np.abs(builders.dense(obj, names) - truth(obj, length)).sum(1)
+
+
+@pytest.mark.parametrize("method", ["SKELETON", "BIHARMONIC"])
+def test_all_meshes_of_the_target_get_the_weights(man, child, method):
+    assert retarget(child[1], method=method) == {"FINISHED"}
+    for obj in child[1]:
+        assert error_of(obj, ARM, 2.0).mean() < 0.05
+        assert abs(builders.dense(obj, ARM).sum(1) - 1).max() < 1e-5
+
+
+def test_bones_of_other_names_are_paired(man):
+    names = ("mixamorig:LeftArm", "mixamorig:LeftForeArm", "mixamorig:LeftHand")
+    _, meshes = limb("Puppet", names)
+    assert retarget(meshes) == {"FINISHED"}
+    assert error_of(meshes[0], names, 3.0).mean() < 0.05
+
+
+def test_the_bone_map_wins_and_can_be_edited(man, child, tmp_path):
+    settings = bpy.context.scene.skinwright.retarget
+    builders.select(*child[1])
+    assert bpy.ops.skinwright.match_bones() == {"FINISHED"}
+    assert [(entry.name, entry.source) for entry in settings.bone_map] == [(name, name) for name in ARM]
+    settings.bone_map["Hand.L"].source = ""
+    retarget(child[1])
+    rows = builders.dense(child[1][1], ARM)
+    assert not rows[:, 2].any()
+    assert np.abs(rows[:, 1] - truth(child[1][1], 2.0)[:, 1:].sum(1)).mean() < 0.05
+    path = str(tmp_path / "map.json")
+    assert bpy.ops.skinwright.bone_map_save(filepath=path) == {"FINISHED"}
+    bpy.ops.skinwright.match_bones()
+    assert settings.bone_map["Hand.L"].source == "Hand.L"
+    assert bpy.ops.skinwright.bone_map_load(filepath=path) == {"FINISHED"}
+    assert settings.bone_map["Hand.L"].source == ""
+
+
+def test_locked_groups_and_other_groups_stay(man, child):
+    obj = child[1][0]
+    builders.paint(obj, pin=0.3, Hand__L=0.25)
+    obj.vertex_groups["Hand.L"].lock_weight = True
+    assert retarget(child[1]) == {"FINISHED"}
+    rows = builders.dense(obj, ["pin", "Hand.L"])
+    assert np.allclose(rows, (0.3, 0.25))
+
+
+def test_the_correspondence_is_shown(man, child):
+    retarget(child[1], show_correspondence=True)
+    for obj in child[1]:
+        colors = np.empty(4 * len(obj.data.vertices), np.float32)
+        obj.data.attributes["Correspondence"].data.foreach_get("color", colors)
+        height = np.array([vertex.co.z for vertex in obj.data.vertices]) / 2.0
+        assert np.abs(colors.reshape(-1, 4)[:, 2] - height).max() < 0.05
+
+
+def test_the_scale_of_objects_does_not_matter(man, child):
+    child[0].scale = (0.01, 0.01, 0.01)
+    bpy.context.view_layer.update()
+    retarget(child[1])
+    assert max(error_of(obj, ARM, 2.0).mean() for obj in child[1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda man, child: child[1][0].modifiers.clear() or setattr(child[1][0], "parent", None), "has no armature"),
+        (lambda man, child: [setattr(b, "use_deform", False) for b in child[0].data.bones], "no bone that deforms"),
+        (lambda man, child: [o.vertex_groups.clear() for o in bpy.data.objects if o.name.startswith("Man ")
+                             and o.type == "MESH"], "deforms no mesh that has weights"),
+        (lambda man, child: [setattr(b, "name", f"x{i}") or setattr(b, "use_deform", i > 5)
+                             for i, b in enumerate(man.data.bones)], "no bone that deforms"),
+    ],
+)  # fmt: skip
+def test_refusals_name_the_object_and_write_nothing(man, child, spoil, sentence):
+    spoil(man, child)
+    before = [builders.weights(obj) for obj in child[1]]
+    with pytest.raises(RuntimeError, match=sentence):
+        retarget(child[1])
+    assert [builders.weights(obj) for obj in child[1]] == before
+
+
+def test_poll_says_what_is_missing(man, child):
+    bpy.context.scene.skinwright.retarget.source = None
+    builders.select(*child[1])
+    assert not bpy.ops.skinwright.retarget_weights.poll()
+    bpy.context.scene.skinwright.retarget.source = man
+    builders.select(*[obj for obj in man.children if obj.type == "MESH"])
+    assert not bpy.ops.skinwright.retarget_weights.poll()
+
+
+def test_the_command_line_does_the_same(addon, man, child, tmp_path):
+    report = tmp_path / "report.json"
+    arguments = ["retarget", "--source", man.name, "--report", str(report)]
+    for obj in child[1]:
+        arguments += ["--target", obj.name]
+    assert addon.headless.command_line.main(arguments) == 0
+    assert max(error_of(obj, ARM, 2.0).mean() for obj in child[1]) < 0.05
+    content = json.loads(report.read_text())
+    assert content["matched"] > 0 and len(content["bone_map"]) == 3
+    assert content["settings"]["method"] == "skeleton"
+    settings = tmp_path / "settings.json"
+    settings.write_text(json.dumps({"bone_map": {"Hand.L": "Nobody"}}))
+    assert addon.headless.command_line.main([*arguments[:3], *arguments[5:], "--settings", str(settings)]) == 1
