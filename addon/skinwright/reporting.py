@@ -152,16 +152,19 @@ class LastResult:
     title: str
     sentence: str
     warnings: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()
     failed: bool = False
 
 
 last: LastResult | None = None
 
 
-def remember(title: str, sentence: str, warnings: Sequence[str] = (), *, failed: bool = False) -> None:
+def remember(
+    title: str, sentence: str, warnings: Sequence[str] = (), *, facts: Sequence[str] = (), failed: bool = False
+) -> None:
     """Show this in the panel until the next result."""
     global last
-    last = LastResult(title, sentence, tuple(warnings), failed)
+    last = LastResult(title, sentence, tuple(warnings), tuple(facts), failed)
 
 
 def forget() -> None:

@@ -142,7 +142,7 @@ class TestWhy:
         found = self.ask(coat, far)
         assert "0.9 from the source, and Distance allows" in found.verdict
         reporting = import_module(f"{PACKAGE}.reporting")
-        assert reporting.last.title == "Why?" and "Follows Hip 0.750, Foot.L 0.250" in reporting.last.warnings
+        assert reporting.last.title == "Why?" and "Follows Hip 0.750, Foot.L 0.250" in reporting.last.facts
 
     def test_the_mask(self, coat):
         group = coat.vertex_groups.new(name="M")

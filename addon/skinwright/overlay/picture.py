@@ -112,7 +112,7 @@ def _make(
         "positions": positions,
         "normals": normals,
         "triangles": _triangles_of(obj),
-        "note": "" if fits else "Shown at rest: a modifier changes the number of vertices",
+        "note": "" if fits else "At rest: a modifier adds vertices",
     }
     if session and match:
         return _picture_of_match(match, session, shape)

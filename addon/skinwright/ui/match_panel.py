@@ -1,10 +1,9 @@
 """The panel of the match: see it, select by it, paint it; and the overlays."""
 
 import bpy
-from bpy.types import Context, Panel, UILayout
+from bpy.types import Context, Panel
 
 from ..check import shown
-from ..match.painting import BRUSH_WEIGHTS, brush_value
 from ..match.session import current_of
 from .panel import Tab
 from .result_panel import paragraph
@@ -30,29 +29,13 @@ class SKINWRIGHT_PT_match(Tab, Panel):
         overlay = context.scene.skinwright.overlay
         shown = overlay.kind == "MATCH" and current_of(context.object)
         layout.operator("skinwright.preview_match", icon="HIDE_OFF", depress=bool(shown))
-        if bpy.ops.skinwright.end_match_mask.poll():
-            _draw_painting(layout, context)
-        else:
+        if not bpy.ops.skinwright.end_match_mask.poll():
             layout.operator("skinwright.paint_match_mask", icon="BRUSH_DATA")
         layout.operator("skinwright.explain_vertex", icon="QUESTION")
         column = layout.column(align=True)
         column.operator("skinwright.select_match", text="Select Unmatched").what = "UNMATCHED"
         column.operator("skinwright.select_match", text="Select Loose Parts").what = "LOOSE"
         column.operator("skinwright.select_match", text="Select Whole Parts").what = "ISLAND"
-
-
-def _draw_painting(layout: UILayout, context: Context) -> None:
-    row = layout.row(align=True)
-    row.operator("skinwright.end_match_mask", text="Keep", icon="CHECKMARK").keep = True
-    row.operator("skinwright.end_match_mask", text="Cancel", icon="X").keep = False
-    row = layout.row(align=True)
-    painted = brush_value(context)
-    for value in BRUSH_WEIGHTS:
-        text = {"INPAINT": "Inpaint", "AUTOMATIC": "Auto", "MATCH": "Match"}[value]
-        row.operator("skinwright.mask_brush", text=text, depress=painted == value).value = value
-    if not painted:
-        layout.label(text="The brush paints another value", icon="ERROR")
-    layout.prop(context.scene.skinwright.overlay, "live")
 
 
 class SKINWRIGHT_PT_match_edit(Tab, Panel):

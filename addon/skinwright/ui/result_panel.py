@@ -35,9 +35,10 @@ class SKINWRIGHT_PT_result(Tab, Panel):
         column = self.layout.column(align=True)
         column.label(text=result.title)
         paragraph(column, context, result.sentence, "ERROR" if result.failed else "CHECKMARK", alert=result.failed)
-        for warning in result.warnings:
-            column.separator()
-            paragraph(column, context, warning, "ERROR")
+        for icon, sentences in (("INFO", result.facts), ("ERROR", result.warnings)):
+            for sentence in sentences:
+                column.separator()
+                paragraph(column, context, sentence, icon)
 
 
 def paragraph(layout: UILayout, context: Context, text: str, icon: str = "NONE", *, alert: bool = False) -> None:

@@ -1,12 +1,10 @@
 """The panel of sculpting weights: begin, what is going on, settings."""
 
 import bpy
-from bpy.types import Context, Panel, UILayout
+from bpy.types import Context, Panel
 
 from ..sculpt import session as sculpt_session
-from ..sculpt.session import ADVICE, POOR, SculptSession
 from .panel import Tab
-from .result_panel import paragraph
 
 
 class SKINWRIGHT_PT_sculpt(Tab, Panel):
@@ -19,9 +17,7 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
         """While sculpting, the ways to end it."""
         layout = self.layout
         settings = context.scene.skinwright.sculpt
-        if sculpt_session.current:
-            _draw_state(layout, context, sculpt_session.current)
-        else:
+        if sculpt_session.current is None:
             layout.operator("skinwright.sculpt_weights", icon="SCULPTMODE_HLT")
             layout.operator("skinwright.desparsify", icon="GROUP_VERTEX")
         layout.prop(settings, "kappa", slider=True)
@@ -31,19 +27,6 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
         shown = context.scene.skinwright.overlay.kind == "INFLUENCES"
         button = layout.operator("skinwright.show_overlay", text="Show Bone Counts", icon="OVERLAY", depress=shown)
         button.kind = "NONE" if shown else "INFLUENCES"
-
-
-def _draw_state(layout: UILayout, context: Context, session: SculptSession) -> None:
-    row = layout.row(align=True)
-    row.operator("skinwright.end_sculpt_weights", text="Keep", icon="CHECKMARK").keep = True
-    row.operator("skinwright.end_sculpt_weights", text="Cancel", icon="X").keep = False
-    column = layout.column(align=True)
-    column.label(text=f"{session.target_name}: {session.stroke_count} strokes, {session.pose_count} poses")
-    if session.reachability is None:
-        return
-    column.progress(factor=max(session.reachability, 0), text=f"{session.reachability:.0%} of the sculpt reached")
-    if session.reachability < POOR:
-        paragraph(column, context, ADVICE, "INFO")
 
 
 class SKINWRIGHT_PT_sculpt_settings(Tab, Panel):

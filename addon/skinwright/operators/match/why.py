@@ -40,9 +40,8 @@ class SKINWRIGHT_OT_explain_vertex(SkinwrightOperator):
         self.report({"INFO"}, found.sentence())
         details = [f"{name} {weight:.3f}" for name, weight in found.weights[:6]]
         shown = [f"Follows {', '.join(details)}" if details else "Follows no bone"]
-        reporting.remember(
-            self.bl_label, found.sentence(), shown + ([f"Worst bend: {found.worst}"] if found.worst else [])
-        )
+        shown += [f"Worst bend: {found.worst}"] if found.worst else []
+        reporting.remember(self.bl_label, found.sentence(), facts=shown)
         return {"FINISHED"}
 
 
