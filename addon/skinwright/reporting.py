@@ -1,6 +1,7 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -147,3 +148,31 @@ class SculptReport:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return _plain(vars(self)) | {"sentence": self.sentence()}
+
+
+@dataclass(frozen=True)
+class LastResult:
+    """What the operator `title` has done or refused, for the panel: a report in the status bar is gone in seconds."""
+
+    title: str
+    sentence: str
+    warnings: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()
+    failed: bool = False
+
+
+last: LastResult | None = None
+
+
+def remember(
+    title: str, sentence: str, warnings: Sequence[str] = (), *, facts: Sequence[str] = (), failed: bool = False
+) -> None:
+    """Show this in the panel until the next result."""
+    global last
+    last = LastResult(title, sentence, tuple(warnings), tuple(facts), failed)
+
+
+def forget() -> None:
+    """Show nothing."""
+    global last
+    last = None

@@ -5,6 +5,7 @@ from . import (
     check_weights,
     desparsify,
     match,
+    panel_buttons,
     presets,
     retarget_weights,
     sculpt,
@@ -24,6 +25,7 @@ MODULES = (
     desparsify,
     *sculpt.MODULES,
     stored_weights,
+    panel_buttons,
     retarget_weights,
     bone_map,
 )

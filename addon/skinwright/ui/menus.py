@@ -10,7 +10,7 @@ def _transfer_weights(menu: Menu, _context: Context) -> None:
 
 def _paint_weight(menu: Menu, context: Context) -> None:
     _transfer_weights(menu, context)
-    menu.layout.operator("skinwright.desparsify", text="Desparsify Weights (Skinwright)")
+    menu.layout.operator("skinwright.desparsify", text="Add Bone Slots (Skinwright)")
 
 
 def _sculpt_weights(menu: Menu, _context: Context) -> None:

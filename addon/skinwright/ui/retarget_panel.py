@@ -23,9 +23,9 @@ class SKINWRIGHT_UL_bone_map(UIList):
         entry: Any,
         _icon: int,
         _active: Any,
-        _property: str,
+        *_more: Any,
     ) -> None:
-        """Bone, partner, confidence."""
+        """Bone, partner, confidence. Blender counts the named arguments: at least seven."""
         sure = entry.source and (entry.source != entry.found or entry.confidence >= UNSURE)
         row = layout.row(align=True)
         row.label(text=entry.name, icon="BONE_DATA" if sure else "ERROR")
