@@ -1,6 +1,6 @@
 """Operators, one file or folder per feature."""
 
-from . import check_weights, desparsify, match, presets, sculpt, stored_weights, transfer_weights
+from . import automatic_weights, check_weights, desparsify, match, presets, sculpt, stored_weights, transfer_weights
 from .modal import timers
 
 MODULES = (
@@ -9,6 +9,7 @@ MODULES = (
     presets,
     *match.MODULES,
     check_weights,
+    automatic_weights,
     desparsify,
     *sculpt.MODULES,
     stored_weights,
