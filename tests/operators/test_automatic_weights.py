@@ -1,11 +1,11 @@
 """The operator: it writes what the native function answers, and respects what the artist has."""
 
 import builders
+import figure
 import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
-import figure
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
 BONES = figure.BONES

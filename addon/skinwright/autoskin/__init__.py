@@ -34,8 +34,8 @@ def automatic_weights(
 ) -> list[AutoskinReport]:
     """Give meshes weights for the deforming bones of `rig`, or of the armature that deforms each.
 
-    Groups that are locked, or not deforming bones of the armature, keep their weights. Nothing is written if an error is
-    raised. Raises SceneError and native.NativeError.
+    Groups that are locked, or not deforming bones of the armature, keep their weights. Nothing is written if an error
+    is raised. Raises SceneError and native.NativeError.
     """
     return jobs.wait(steps(objects, rig, params))
 
