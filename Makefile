@@ -187,3 +187,12 @@ fuzz-python: .venv/tests.stamp
 ## make soak       8,000 operations in one Blender: memory, threads, files and handlers stay flat
 soak: .venv/tests.stamp
 	$(IN_TIME) 3600 .venv/bin/python tests/fuzz/soak.py --seconds 3000 --cases 8000
+## make autoskin-eval  automatic weights against artists' and Blender's own: bench/autoskin_results.md and .png
+.PHONY: autoskin-eval
+autoskin-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 1800 .venv/bin/python bench/autoskin_eval.py --body $(BODY)
+
+## make embed-eval  a bare armature into other bodies, joints compared: bench/embed_results.md
+.PHONY: embed-eval
+embed-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)

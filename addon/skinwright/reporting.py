@@ -104,6 +104,28 @@ def _plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class AutoskinReport:
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
+
+    target: str
+    armature: str
+    vertices: int
+    bones: int
+    outside: list[str]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return f"{self.target}: {self.vertices} vertices have weights for {self.bones} bones of {self.armature}"
+
+    def warnings(self) -> list[str]:
+        """What is worth a look."""
+        if not self.outside:
+            return []
+        named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
+        return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
+
+
+@dataclass(frozen=True)
 class DesparsifyReport:
     """What desparsification gave and took; `dropped` counts influences that had weight, `groups` lists new ones."""
 

@@ -150,6 +150,14 @@ def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options:
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
 
 
+def start_automatic_weights(
+    name: str, positions: NDArray, triangles: NDArray, segments: NDArray, parents: NDArray, **options: Any
+) -> Job:
+    """Compute automatic weights on threads of Rust's own; keyword arguments as in the stub."""
+    with _naming(name):
+        return Job(name, _module.start_automatic_weights(positions, triangles, segments, parents, **options))
+
+
 def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:
     """(V, 3) where linear blend skinning takes rest positions (V, 3) by matrices (B, 4, 4), all in one space."""
     with _naming(name):

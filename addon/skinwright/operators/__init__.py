@@ -1,6 +1,7 @@
 """Operators, one file or folder per feature."""
 
 from . import (
+    automatic_weights,
     bone_map,
     check_weights,
     desparsify,
@@ -22,6 +23,7 @@ MODULES = (
     presets,
     *match.MODULES,
     check_weights,
+    automatic_weights,
     desparsify,
     *sculpt.MODULES,
     stored_weights,
