@@ -183,6 +183,60 @@ def fill(
     `weld` (V,): for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
     """
 
+Quality = Literal["live", "bake"]
+
+@final
+class Refiner:
+    """A character prepared once (lattice, embedding, joints) for any number of poses, in any order.
+
+    `rest_positions` (V, 3) and `bone_segments` (B, 2, 3), head and tail, are at rest in the mesh's own space;
+    `bone_parents` (B,) is negative for a root. `cell` is the edge of a lattice cell in mesh units (None: 1.5 % of the
+    bounding box's diagonal). Each constraint is switched off with 0 or False: `stretch` and `energy` are stiffnesses,
+    `volume` from 0 to 1 (exact), `bind` the farthest that skin may come from its bone as a multiple of rest.
+    """
+
+    def __new__(
+        cls,
+        rest_positions: ArrayLike,
+        triangles: ArrayLike,
+        weights: Weights,
+        bone_parents: ArrayLike,
+        bone_segments: ArrayLike,
+        *,
+        cell: float | None = None,
+        stretch: float = 1.0,
+        volume: float = 1.0,
+        bind: float = 1.08,
+        energy: float = 0.1,
+        self_collision: bool = True,
+        threads: int = 0,
+    ) -> Refiner: ...
+    def solve(self, pose_from_rest: ArrayLike, *, quality: Quality = "live") -> NDArray[np.float32]:
+        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than "bake"."""
+
+    def measure(self, pose_from_rest: ArrayLike, positions: ArrayLike) -> dict[str, Any]:
+        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that turns
+        its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
+
+    def report(self) -> dict[str, Any] | None:
+        """Figures of the pose solved last, which is solved once more for them; None before the first."""
+
+def intersecting_pairs(positions: ArrayLike, triangles: ArrayLike, *, threads: int = 0) -> NDArray[np.uint32]:
+    """Pairs (P, 2) of triangles that pass through each other and share no vertex, ascending."""
+
+def dual_quaternion_blend(
+    rest_positions: ArrayLike,
+    weights: Weights,
+    pose_from_rest: ArrayLike,
+    *,
+    rest_bones: ArrayLike | None = None,
+    threads: int = 0,
+) -> NDArray[np.float32]:
+    """Dual quaternion skinning exactly as Blender's Armature modifier does it with Preserve Volume: (V, 3).
+
+    `rest_bones` (B, 4, 4), the bones' rest matrices, matter only where bones scale.
+    """
+
 def linear_blend(
     rest_positions: ArrayLike, weights: Weights, pose_from_rest: ArrayLike, *, threads: int = 0
 ) -> NDArray[np.float32]:

@@ -26,6 +26,7 @@ MODULES = (
     automatic_weights,
     desparsify,
     *sculpt.MODULES,
+    *refine.MODULES,
     stored_weights,
     panel_buttons,
     retarget_weights,
