@@ -62,9 +62,11 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if that is
+    larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices that
+    close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
     `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
@@ -75,6 +77,7 @@ class TransferSettings(TypedDict, total=False):
     max_normal_angle: float
     match_flipped_normals: bool
     mask: ArrayLike | None
+    relative_weld_tolerance: float
     smoothness_length: float | None
     relative_smoothness_length: float
     smoothing_iterations: int
@@ -95,6 +98,7 @@ class Source:
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
+        target_edges: ArrayLike | None = None,
         threads: int = 0,
         **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
@@ -105,7 +109,14 @@ class Inpainting:
     system is factored again only when its own unknowns or the smoothness length change."""
 
     def __new__(
-        cls, source: Source, target_positions: ArrayLike, target_triangles: ArrayLike, *, threads: int = 0
+        cls,
+        source: Source,
+        target_positions: ArrayLike,
+        target_triangles: ArrayLike,
+        *,
+        target_edges: ArrayLike | None = None,
+        threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Inpainting: ...
     @property
     def distance(self) -> NDArray[np.float32]: ...
@@ -138,11 +149,13 @@ def transfer_weights(
     target_positions: ArrayLike,
     target_triangles: ArrayLike,
     *,
+    target_edges: ArrayLike | None = None,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
+    relative_weld_tolerance: float = 1e-06,
     smoothness_length: float | None = None,
     relative_smoothness_length: float = 0.05,
     smoothing_iterations: int = 0,
@@ -380,8 +393,8 @@ def biharmonic_embedding(
     """Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance (Lipman et al. 2010,
     doi:10.1145/1805964.1805971), from the smallest non-zero eigenpairs of the cotangent Laplacian: phi_k / lambda_k.
 
-    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too small
-    for are zero, and so are the rows of vertices without a triangle.
+    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too
+    small for are zero, and so are the rows of vertices without a triangle.
     """
 
 @final
@@ -436,10 +449,10 @@ def retarget_weights(
 ) -> Retarget:
     """Weights of one character for another with a matching skeleton.
 
-    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may stand,
-    face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's, negative for
-    none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor, by
-    `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
+    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may
+    stand, face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's,
+    negative for none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor,
+    by `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
     distance.
 
     "skeleton" brings the target into the source's pose and proportions bone by bone and matches by position and normal;
@@ -479,6 +492,7 @@ def start_retarget_weights(
     smoothing_factor: float = 0.2,
 ) -> Job:
     """Starts `retarget_weights` on threads of its own; `Job.result` returns a `Retarget`."""
+
 @final
 class AutoWeights:
     """Automatic weights: one row per vertex, none empty, each summing to 1."""
@@ -487,9 +501,9 @@ class AutoWeights:
     def weights(self) -> Weights: ...
     @property
     def report(self) -> dict[str, Any]:
-        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
-        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
-        `seconds` by stage."""
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside`
+        (bones no part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice,
+        `residual`, `seconds` by stage."""
 
 def automatic_weights(
     positions: ArrayLike,
@@ -507,10 +521,10 @@ def automatic_weights(
     overlapping, of many islands, split at seams (coincident vertices get equal rows).
 
     `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
-    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
-    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
-    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
-    """
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse
+    distances to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit.
+    `resolution`: cells along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat
+    keeps to its bone."""
 
 def start_automatic_weights(
     positions: ArrayLike,
@@ -544,8 +558,8 @@ class Embedding:
 
     @property
     def report(self) -> dict[str, Any]:
-        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
-        are outside of the mesh), `penalty`, `seconds`."""
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones
+        whose heads are outside of the mesh), `penalty`, `seconds`."""
 
 def embed_skeleton(
     positions: ArrayLike,
@@ -559,9 +573,9 @@ def embed_skeleton(
 ) -> Embedding:
     """Puts the bones of a template into a mesh that has none.
 
-    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
-    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
-    needs the shape of the mesh only.
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int,
+    negative for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it
+    is. "medial" needs the shape of the mesh only.
     """
 
 def start_embed_skeleton(

@@ -69,13 +69,30 @@ class Source:
 class Inpainting:
     """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
 
-    def __init__(self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0) -> None:
+    def __init__(
+        self,
+        source: Source,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        threads: int = 0,
+        *,
+        edges: NDArray | None = None,
+        **settings: Any,
+    ) -> None:
         self.name = name
         with _naming(name):
-            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads)
+            self._inpainting = _module.Inpainting(
+                source._source, positions, triangles, target_edges=edges, threads=threads, **settings
+            )
         self.distance: NDArray[np.float32] = self._inpainting.distance
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands
+
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the source other weights; a solve with them factors nothing that is factored already."""
+        with _naming(self.name):
+            self._inpainting.set_source_weights(_module.Weights(*rows, n_columns))
 
     def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
         """(V,) which vertices match; waits for a job that is going on."""
@@ -178,6 +195,14 @@ def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options:
     """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
     with _naming(name):
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
+
+
+def start_automatic_weights(
+    name: str, positions: NDArray, triangles: NDArray, segments: NDArray, parents: NDArray, **options: Any
+) -> Job:
+    """Compute automatic weights on threads of Rust's own; keyword arguments as in the stub."""
+    with _naming(name):
+        return Job(name, _module.start_automatic_weights(positions, triangles, segments, parents, **options))
 
 
 def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:
