@@ -131,9 +131,9 @@ fn limb(around: usize, along: usize) -> Limb {
     for j in 0..around {
         for i in 0..along {
             let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
-            triangles.extend([[a, d, b], [a, c, d]]);
+            triangles.extend([[a, b, d], [a, d, c]]);
         }
-        triangles.extend([[ends[0], at(0, j), at(0, j + 1)], [ends[1], at(along, j + 1), at(along, j)]]);
+        triangles.extend([[ends[0], at(0, j + 1), at(0, j)], [ends[1], at(along, j), at(along, j + 1)]]);
     }
     let (mut indptr, mut bones, mut values) = (vec![0u32], Vec::new(), Vec::new());
     for p in &positions {
