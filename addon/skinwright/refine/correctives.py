@@ -80,7 +80,7 @@ class _Key:
 def steps(
     obj: bpy.types.Object, params: CorrectiveParams, chosen: set[str] | None = None
 ) -> "jobs.Jobs[CorrectiveReport]":
-    """Bake correctives of the chosen joints (all that skin follows if none is): nothing is written before all is solved."""
+    """Bake correctives of the chosen joints (all that skin follows if none is): nothing is written before the end."""
     driven_keys.check(obj)
     character = characters.read(obj)
     bones = joints(character, chosen or set())
