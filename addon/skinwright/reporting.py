@@ -1,6 +1,7 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,6 +104,28 @@ def _plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class AutoskinReport:
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
+
+    target: str
+    armature: str
+    vertices: int
+    bones: int
+    outside: list[str]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return f"{self.target}: {self.vertices} vertices have weights for {self.bones} bones of {self.armature}"
+
+    def warnings(self) -> list[str]:
+        """What is worth a look."""
+        if not self.outside:
+            return []
+        named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
+        return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
+
+
+@dataclass(frozen=True)
 class DesparsifyReport:
     """What desparsification gave and took; `dropped` counts influences that had weight, `groups` lists new ones."""
 
@@ -147,3 +170,31 @@ class SculptReport:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return _plain(vars(self)) | {"sentence": self.sentence()}
+
+
+@dataclass(frozen=True)
+class LastResult:
+    """What the operator `title` has done or refused, for the panel: a report in the status bar is gone in seconds."""
+
+    title: str
+    sentence: str
+    warnings: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()
+    failed: bool = False
+
+
+last: LastResult | None = None
+
+
+def remember(
+    title: str, sentence: str, warnings: Sequence[str] = (), *, facts: Sequence[str] = (), failed: bool = False
+) -> None:
+    """Show this in the panel until the next result."""
+    global last
+    last = LastResult(title, sentence, tuple(warnings), tuple(facts), failed)
+
+
+def forget() -> None:
+    """Show nothing."""
+    global last
+    last = None

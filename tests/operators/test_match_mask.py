@@ -262,3 +262,9 @@ class TestRefusedMeansUnchanged:
         with pytest.raises(RuntimeError, match="Internal error .KeyError: 'x'."):
             bpy.ops.skinwright.edit_match_mask(action="CLEAR")
         assert ([group.name for group in coat.vertex_groups], coat.skinwright.mask_group) == before
+
+
+def test_a_mirrored_half_is_previewed_by_its_own_vertices(scene, coat):
+    coat.modifiers.new("Mirror", "MIRROR")
+    for operator in ("preview_match", "store_match", "select_match"):
+        assert getattr(bpy.ops.skinwright, operator)() == {"FINISHED"}

@@ -56,7 +56,7 @@ class MatchSession:
         self.body = read_body(source, params)
         self.garment = read_garment(target, self.body, params)
         self.inpainting = prepare(bone_source(self.body), self.garment, params)
-        self.n_vertices = len(self.garment.geometry.positions)
+        self.n_vertices = self.garment.completion.n_own
         self.mask = np.full(self.n_vertices, mask.AUTOMATIC, np.uint8)
         self.mask_version = 0
         self.read_mask(target)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..check import shown as checked
 from ..check.weight_check import Fault, WeightCheck
 from ..csr import Rows
+from ..match import explain
 from ..match import session as match_session
 from ..match.session import Category, Match, MatchSession
 from ..scene import armature, changes, deformation, mesh, vertex_groups
@@ -61,7 +62,7 @@ def forget() -> None:
     """Drop what is kept between drawings."""
     global _kept, _triangles
     _kept = _triangles = None
-    match_session.current = comparing.current = None
+    match_session.current = comparing.current = explain.current = None
 
 
 def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Picture | None:
@@ -111,7 +112,7 @@ def _make(
         "positions": positions,
         "normals": normals,
         "triangles": _triangles_of(obj),
-        "note": "" if fits else "Shown at rest: a modifier changes the number of vertices",
+        "note": "" if fits else "At rest: a modifier adds vertices",
     }
     if session and match:
         return _picture_of_match(match, session, shape)
@@ -172,10 +173,10 @@ def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     weights = vertex_groups.read(obj, _bone_names(obj))
     count = influences(weights)
     spare = len(weights.bones) - int(count.sum())
-    note = f"and {spare:,} members of weight 0" if spare else ""
+    notes = [shape["note"], f"and {spare:,} members of weight 0" if spare else ""]
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
-    return Picture(**shape, values=count, rows=rows, note=note)
+    return Picture(**shape | {"note": ". ".join(filter(None, notes))}, values=count, rows=rows)
 
 
 def _picture_of_difference(obj: bpy.types.Object, shape: dict) -> Picture:

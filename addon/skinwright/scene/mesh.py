@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -90,6 +91,18 @@ def selected(obj: bpy.types.Object) -> NDArray[np.bool_]:
     mesh.loops.foreach_get("vertex_index", vertices)
     select[vertices[np.repeat(faces, corners)]] = True
     return select
+
+
+def active_vertex(obj: bpy.types.Object) -> int | None:
+    """The vertex picked last, else the first selected one; None without any."""
+    if obj.mode == "EDIT":
+        edited = bmesh.from_edit_mesh(obj.data)
+        active = edited.select_history.active
+        if isinstance(active, bmesh.types.BMVert):
+            return active.index
+        return next((vertex.index for vertex in edited.verts if vertex.select), None)
+    chosen = np.flatnonzero(selected(obj))
+    return int(chosen[0]) if chosen.size else None
 
 
 def edges(obj: bpy.types.Object) -> NDArray[np.int32]:

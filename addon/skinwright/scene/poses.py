@@ -17,11 +17,16 @@ _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis
 
 def keyframes(armature: bpy.types.Object, most: int) -> Iterator[str]:
     """The frames that have keys, at most so many, evenly chosen; yields "frame N"."""
-    frames = sorted({round(key.co[0]) for curve in _curves(armature) for key in curve.keyframe_points})
+    frames = keyed_frames(armature)
     if not frames:
         raise SceneError(f"{armature.name} has no keyframes: give it an action, or choose Range of Motion")
     for frame in _shown(armature, frames, most):
         yield f"frame {frame}"
+
+
+def keyed_frames(armature: bpy.types.Object) -> list[int]:
+    """The frames that have keys, ascending."""
+    return sorted({round(key.co[0]) for curve in _curves(armature) for key in curve.keyframe_points})
 
 
 def marked_frames(armature: bpy.types.Object, most: int) -> Iterator[str]:

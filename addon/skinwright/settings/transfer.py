@@ -83,5 +83,6 @@ class SKINWRIGHT_PG_transfer(TransferSettings, PropertyGroup):
         name="Source",
         description="The body whose weights are transferred to the selected meshes",
         type=Object,
-        poll=lambda _settings, obj: obj.type == "MESH",
+        # Shapes of bones are meshes too, and have no weights.
+        poll=lambda _settings, obj: obj.type == "MESH" and bool(obj.vertex_groups),
     )

@@ -125,7 +125,7 @@ impl<'a> Topology<'a> {
         };
         // Duplicates connect nothing that is not connected without them.
         let ((duplicates, mut around), islands) =
-            rayon::join(find_duplicates, || Islands::new(&triangles, &wires.edges, vertex_count));
+            rayon::join(find_duplicates, || Islands::with_wires(&triangles, &wires.edges, vertex_count));
         if !duplicates.is_empty() {
             let mut dropped = duplicates.iter().peekable();
             let keep = |&(t, _): &(usize, &[u32; 3])| dropped.next_if(|&&d| d as usize == t).is_none();
@@ -163,8 +163,13 @@ pub struct Islands {
 }
 
 impl Islands {
-    /// Finds the islands of `triangles` (T, 3) and `wires` (W, 2) over `vertex_count` vertices.
-    pub fn new(triangles: &[[u32; 3]], wires: &[[u32; 2]], vertex_count: usize) -> Self {
+    /// Finds the islands of `triangles` (T, 3) over `vertex_count` vertices.
+    pub fn new(triangles: &[[u32; 3]], vertex_count: usize) -> Self {
+        Self::with_wires(triangles, &[], vertex_count)
+    }
+
+    /// The same with `wires` (W, 2).
+    pub fn with_wires(triangles: &[[u32; 3]], wires: &[[u32; 2]], vertex_count: usize) -> Self {
         let mut sets = DisjointSets::new(vertex_count);
         let mut used = vec![false; vertex_count];
         for &[a, b, c] in triangles {

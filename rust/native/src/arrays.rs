@@ -44,6 +44,14 @@ impl Number for u32 {
 impl Number for i32 {
     const WHOLE: Option<(f64, f64)> = Some((-2_147_483_648.0, 2_147_483_647.0));
 }
+impl Number for i64 {
+    // As far as a double tells whole numbers apart.
+    const WHOLE: Option<(f64, f64)> = Some((-9_007_199_254_740_992.0, 9_007_199_254_740_992.0));
+}
+
+impl Number for i64 {
+    const WHOLE: Option<(f64, f64)> = Some((-9_007_199_254_740_992.0, 9_007_199_254_740_992.0));
+}
 
 impl<'py, T: Number, D: Dimension + 'py> FromPyObject<'_, 'py> for Array<'py, T, D>
 where

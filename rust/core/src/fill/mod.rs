@@ -105,7 +105,8 @@ impl Fill {
                 if found != vertex_count {
                     return Err(Error::LengthMismatch { what: "weld", found, expected: vertex_count });
                 }
-                weld.welded(&positions, &triangles, &edges)
+                let (positions, triangles) = weld.welded(&positions, &triangles);
+                (positions, triangles, weld.welded_edges(&edges))
             }
         };
         let mesh = TriMesh::of_checked(&positions, &triangles);

@@ -49,8 +49,8 @@ impl Target {
         let (positions, triangles, edges, given) = match &weld {
             None => (given.positions, given.triangles, given.edges, None),
             Some(weld) => {
-                let (positions, triangles, edges) = weld.welded(&given.positions, &given.triangles, &given.edges);
-                (positions, triangles, edges, Some(given))
+                let (positions, triangles) = weld.welded(&given.positions, &given.triangles);
+                (positions, triangles, weld.welded_edges(&given.edges), Some(given))
             }
         };
         let mesh = TriMesh::of_checked(&positions, &triangles);
