@@ -1,8 +1,8 @@
 """Pairs of characters with known answers, and the figures that judge retargeted weights.
 
-MakeHuman's bodies are one mesh in many shapes, so a vertex's own index is its true place on the source. The honest variant
-takes that gift away: the target's mesh is subdivided and decimated at random, and its true weights are interpolated.
-"""
+MakeHuman's bodies are one mesh in many shapes, so a vertex's own index is its true place on the source. The honest
+variant takes that gift away: the target's mesh is subdivided and decimated at random, and its true weights are
+interpolated."""
 
 from __future__ import annotations
 

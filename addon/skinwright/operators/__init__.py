@@ -1,10 +1,12 @@
 """Operators, one file or folder per feature."""
 
 from . import (
+    automatic_weights,
     bone_map,
     check_weights,
     desparsify,
     match,
+    panel_buttons,
     presets,
     retarget_weights,
     sculpt,
@@ -21,9 +23,12 @@ MODULES = (
     presets,
     *match.MODULES,
     check_weights,
+    automatic_weights,
     desparsify,
     *sculpt.MODULES,
+    *refine.MODULES,
     stored_weights,
+    panel_buttons,
     retarget_weights,
     bone_map,
 )

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from bpy.types import Context, Object, Operator
 
-from .. import native
+from .. import native, reporting
 from ..errors import Refused, internal
 from ..stored import keeping
 from .modal import brush_session
@@ -41,10 +41,14 @@ class SkinwrightOperator(Operator):
         try:
             return work()
         except Refused as refused:
-            self.report({"ERROR"}, str(refused))
+            self._fail(str(refused))
         except Exception as error:
-            self.report({"ERROR"}, f"{self.bl_label}: {internal(error)}")
+            self._fail(f"{self.bl_label}: {internal(error)}")
         return {"CANCELLED"}
+
+    def _fail(self, sentence: str) -> None:
+        reporting.remember(self.bl_label, sentence, failed=True)
+        self.report({"ERROR"}, sentence)
 
     def keep_before(self, objects: Sequence[Object]) -> None:
         """Keep the weights of `objects` in the file, as they are before this operator writes."""
@@ -52,6 +56,7 @@ class SkinwrightOperator(Operator):
 
     def tell(self, sentence: str, warnings: list[str]) -> set[str]:
         """The result, and then what is worth a look, as the status bar shows the last report."""
+        reporting.remember(self.bl_label, sentence, warnings)
         self.report({"INFO"}, sentence)
         for warning in warnings:
             self.report({"WARNING"}, warning)

@@ -16,7 +16,7 @@ Landmark = tuple[str, int, str, int]
 
 @dataclass(frozen=True)
 class RetargetParams(Params):
-    """`bone_map` names the source's bone for bones of the target ("" for none); the others are matched by name and place.
+    """`bone_map` names the source's bone for bones of the target ("" for none); others are matched by name and place.
 
     `landmarks` are used by the Biharmonic method, beside those that the bones give.
     """

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from . import vertex_groups
+from . import symmetry, vertex_groups
 from .error import SceneError
 
 INPAINT, AUTOMATIC, FORCE_MATCH = 0, 1, 2
@@ -106,6 +106,13 @@ def shrink(weights: Values, edges: NDArray[np.integer]) -> Values:
     """Make the inpainted vertices automatic that have a neighbour which is not inpainted."""
     inpainted = weights < 0.25
     return with_value(weights, inpainted & _beside(~inpainted, edges), 0.5)
+
+
+def mirrored(weights: Values, positions: NDArray[np.float32], side: int) -> Values:
+    """The mask of the side where x * `side` > 0 on the other as well; a vertex without a partner keeps its own."""
+    partner = symmetry.partners(positions)
+    taken = (positions[:, 0] * side < 0) & (partner >= 0)
+    return np.where(taken, weights[partner], weights)
 
 
 def counts(weights: Values) -> tuple[int, int, int]:

@@ -5,6 +5,7 @@ changes the weights of these vertices such that the pose shows what was sculpted
 name each time, as Blender's undo replaces it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -32,10 +33,14 @@ from ..scene import (
 from ..scene.error import SceneError
 from .candidates import choose
 from .copies import Copies
+from .mirror import Mirror
 from .params import SculptParams as SculptOptions
 
 # Every keyframe costs a pass over the mesh when a session begins.
 MOST_GUARD_FRAMES = 24
+# Below this share of a sculpt reached, weights are not what is missing.
+POOR = 0.3
+ADVICE = "Weights can do no more: bend the joint further, lower Stiffness, or set Leftover to Shape Key"
 # Of a stroke where driven shape keys change the rest shape.
 _PASSES = 6
 
@@ -91,6 +96,10 @@ class SculptSession:
             passes=options.passes,
             threads=options.threads,
         )
+        self._mirror = Mirror(obj, self.names, self._columns, self._basis) if options.mirror else None
+        # How many of the solver's strokes each stroke of the artist is, those taken back last.
+        self._steps: list[int] = []
+        self._taken_back: list[int] = []
         if options.guard == "ACTION":
             for _ in poses.keyframes(rig, MOST_GUARD_FRAMES):
                 self._solver.guard(bendy.matrices(obj, rig, self.names, self._columns), options.guard_alpha)
@@ -204,7 +213,7 @@ class SculptSession:
 
     def _enter_pose(self, obj: bpy.types.Object) -> None:
         rig = self.rig.find()
-        matrices = bendy.matrices(obj, rig, self.names, self._columns)
+        matrices = self._matrices = bendy.matrices(obj, rig, self.names, self._columns)
         if np.allclose(matrices, matrices[0], rtol=0, atol=1e-6):
             raise SceneError(
                 f"{self.rig.name} is at rest, where weights change nothing: pose it, then sculpt {self.target_name}"
@@ -217,12 +226,25 @@ class SculptSession:
         if self.options.guard == "RANGE":
             self._guard_joints(obj, vertices)
         del self._reached[self.stroke_count :]
-        rows, reachability = self._reach(obj, vertices, targets)
+        reachability = self._reach(obj, vertices, targets)
+        other = self._reach_mirrored(vertices, targets) if self._mirror else vertices[:0]
         self._reached.append(reachability)
-        vertex_groups.write(obj, self.names, self._columns.names_only(rows), vertices)
-        return Outcome(len(vertices), reachability)
+        self._steps.append(1 + bool(other.size))
+        self._taken_back.clear()
+        touched = np.union1d(vertices, other).astype(np.uint32)
+        vertex_groups.write(obj, self.names, self._present(touched), touched)
+        return Outcome(len(touched), reachability)
 
-    def _reach(self, obj: bpy.types.Object, vertices: NDArray, targets: NDArray) -> tuple[csr.Rows, float]:
+    def _reach_mirrored(self, vertices: NDArray, targets: NDArray) -> NDArray:
+        """The same on the other side, in the pose that is this one's mirror image; gives the vertices there."""
+        other, mirrored = self._mirror.of_stroke(vertices, targets)
+        if other.size:
+            self._solver.add_pose(self._mirror.of_pose(self._matrices))
+            self._solver.stroke(other, mirrored)
+            self._solver.add_pose(self._matrices)
+        return other
+
+    def _reach(self, obj: bpy.types.Object, vertices: NDArray, targets: NDArray) -> float:
         """Solve; where driven shape keys give this pose another rest shape, targets are corrected for what that adds.
 
         The solver has one rest shape. The difference d of this pose's adds T(w) d, which is taken off the targets for
@@ -236,8 +258,8 @@ class SculptSession:
             if wanted is not targets:
                 self._solver.undo()
             wanted = (targets - added).astype(np.float32)
-            rows, reachability, _ = self._solver.stroke(vertices, wanted)
-        return rows, reachability
+            _, reachability, _ = self._solver.stroke(vertices, wanted)
+        return reachability
 
     def _guard_joints(self, obj: bpy.types.Object, vertices: NDArray) -> None:
         """The joints that a stroke touches for the first time."""
@@ -257,16 +279,20 @@ class SculptSession:
 
     def undo(self) -> bool:
         """Take the last stroke back, weights and memory; False if there is none."""
-        return self._write_back(self._solver.undo())
+        return self._step(self._steps, self._taken_back, self._solver.undo)
 
     def redo(self) -> bool:
         """Do the stroke again that was last taken back; False if there is none."""
-        return self._write_back(self._solver.redo())
+        return self._step(self._taken_back, self._steps, self._solver.redo)
 
-    def _write_back(self, vertices: NDArray | None) -> bool:
-        if vertices is not None:
-            vertex_groups.write(self._found(), self.names, self._present(vertices), vertices)
-        return vertices is not None
+    def _step(self, taken: list[int], given: list[int], step: Callable[[], NDArray | None]) -> bool:
+        if not taken:
+            return False
+        given.append(taken.pop())
+        touched = [step() for _ in range(given[-1])]
+        vertices = np.unique(np.concatenate(touched)).astype(np.uint32)
+        vertex_groups.write(self._found(), self.names, self._present(vertices), vertices)
+        return True
 
     def assert_state(self) -> None:
         """Write weights and rest positions of the session again, after something else has changed them."""
@@ -279,7 +305,7 @@ class SculptSession:
     @property
     def stroke_count(self) -> int:
         """Number of strokes that count."""
-        return self._solver.stroke_count
+        return len(self._steps)
 
     @property
     def pose_count(self) -> int:
@@ -289,7 +315,7 @@ class SculptSession:
     @property
     def reachability(self) -> float | None:
         """Of the last stroke that counts."""
-        return self._solver.reachability
+        return self._reached[self.stroke_count - 1] if self._steps else None
 
     def commit(self) -> SculptReport:
         """Keep the weights, and what they cannot reach if that is wanted. Raises SceneError for another mesh."""

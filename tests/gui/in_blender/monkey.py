@@ -71,7 +71,7 @@ class Monkey:
         self.window, self.random = window, random.Random(seed)
         self.folder = tempfile.mkdtemp()
         self.before = None  # name, weights and rest of the object of the session that runs
-        self.checked = 0
+        self.checked = self.begun = 0
 
     def scene(self) -> Steps:
         armature, figure, garment = dress.build(300, 4)
@@ -103,7 +103,10 @@ class Monkey:
 
     def begin(self, name: str, brush, *arguments) -> Steps:
         figure = bpy.data.objects.get(DRESS if name == "paint_match_mask" else BODY)
-        if bpy.context.mode == "OBJECT" and figure and self.random.random() < 0.8:
+        if brushes() is None and bpy.context.mode != "OBJECT" and bpy.context.object:
+            with self.window.context():
+                bpy.ops.object.mode_set(mode="OBJECT")
+        if bpy.context.mode == "OBJECT" and figure and self.random.random() < 0.9:
             for other in bpy.context.view_layer.objects:
                 other.select_set(other == figure)
             bpy.context.view_layer.objects.active = figure
@@ -113,7 +116,7 @@ class Monkey:
         fresh = brushes() is None
         yield from self.call(name)
         if fresh and brushes() and brushes().target() == obj:
-            self.before = (obj.session_uid, before)
+            self.before, self.begun = (obj.session_uid, before), self.begun + 1
             brush(self.window, *arguments)
 
     def stroke(self) -> Steps:
@@ -283,7 +286,7 @@ class Monkey:
 
     WEIGHTS = {
         "stroke": 30, "undo": 8, "redo": 5, "edit_undo": 3, "edit_redo": 2, "begin_sculpt": 9, "begin_paint": 5,
-        "escape": 3, "enter": 3, "button": 2, "mode": 6, "pose": 4, "rename": 2, "rename_back": 2, "play": 1,
+        "escape": 6, "enter": 3, "button": 2, "mode": 6, "pose": 4, "rename": 2, "rename_back": 2, "play": 1,
         "radial": 1, "remesh": 1, "delete": 0.7, "save": 1, "reopen": 0.5, "other_window": 1, "our_operator": 6,
         "settings": 2, "activate": 3,
     }  # fmt: skip
@@ -306,7 +309,7 @@ class Monkey:
             return
         (uid, before), self.before = self.before, None
         obj = next((o for o in bpy.data.objects if o.session_uid == uid), None)
-        foreign = {"remesh", "edit_undo", "edit_redo", "undo", "redo", "our_operator", "mode"}
+        foreign = {"remesh", "delete", "our_operator"}
         if by == "escape" and obj and before and not foreign & set(self.since):
             assert weights_and_rest(obj) == before, "Esc has left something"
             self.checked += 1
@@ -341,7 +344,7 @@ def steps(window: Window) -> Steps:
         if had and brushes() is not had:
             monkey.check_ended(name)
         assert not listener.heard, (number, history[-12:], "".join(listener.heard)[-2000:])
-    record["actions"], record["Esc checked"] = actions, monkey.checked
+    record["actions"], record["sessions"], record["Esc checked"] = actions, monkey.begun, monkey.checked
 
 
 if __name__ == "__main__":

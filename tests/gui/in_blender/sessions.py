@@ -367,6 +367,7 @@ def painting_ends_in_order(window: Window) -> Steps:
     window.event("MOUSEMOVE")
     yield from left_nothing(window)
     yield from dismiss_popup(window)
+    bare = state("Dress")  # what was painted before the error is kept
     yield from begin_painting(window)
     window.key("ESC")
     yield from left_nothing(window)

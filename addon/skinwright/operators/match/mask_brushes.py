@@ -29,7 +29,7 @@ class MaskBrushes(BrushSession):
         match_session.current = self.painting.session
         self.painting.open(context)
         if self.painting.armature_added:
-            self.news = f"{self.object.name} now follows {self.painting.armature.name}"
+            self.news = f"{self.object.name} has the source's armature now"
         modes.go_to(self.target(), self.mode)
 
     def problem(self, obj: Object) -> str:
@@ -57,7 +57,7 @@ class MaskBrushes(BrushSession):
     def keep(self, _context: Context) -> list[Message]:
         """Mask and weights."""
         self.painting.finish()
-        added = f", and it follows {self.painting.armature.name} now" if self.painting.armature_added else ""
+        added = ", and it has the source's armature now" if self.painting.armature_added else ""
         return [Message("INFO", f"{self.object.name}: mask and weights kept{added}")]
 
     def restore(self) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 from bpy.types import Context
 
+from ... import reporting
 from ...errors import Refused, internal
 from ...scene import mesh, modes
 from . import brush_session, status, undo
@@ -115,3 +116,11 @@ def _leave(session: BrushSession, ending: Ending) -> None:
     if obj and obj.mode == session.mode:
         planned = ending in (Ending.KEEP, Ending.CANCEL)
         modes.go_to(obj, session.mode_before if planned else "OBJECT")
+
+
+def remember(label: str, messages: list[Message]) -> None:
+    """For the panel: the last sentence that is not a warning is the result."""
+    results = [message for message in messages if message.level != "WARNING"] or messages[:1]
+    if results:
+        warnings = [message.text for message in messages if message is not results[-1]]
+        reporting.remember(label, results[-1].text, warnings, failed=results[-1].level == "ERROR")

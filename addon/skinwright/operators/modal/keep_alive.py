@@ -3,6 +3,7 @@
 import bpy
 from bpy.app.handlers import load_post, load_post_fail, load_pre, persistent, save_post, save_post_fail, save_pre
 
+from ... import reporting
 from ...scene import modes
 from . import brush_session, ending, status
 from .brush_session import BrushSession
@@ -60,7 +61,7 @@ def _hand_on() -> None:
         except RuntimeError:
             handed_on = False
         if not handed_on:
-            ending.end(bpy.context, session, Ending.ASIDE)
+            ending.remember(session.label, ending.end(bpy.context, session, Ending.ASIDE))
             bpy.ops.ed.undo_push(message=session.label)
 
 
@@ -101,7 +102,11 @@ def _after_load(*_arguments: object) -> None:
     global _loading
     _loading = False
     _forget()
+    reporting.forget()
     status.clear()
+    if brush_session.flagged():
+        text = "The file was saved while weights were sculpted or painted: they are as they were then"
+        reporting.remember("Skinwright", text)
     for obj in brush_session.flagged():
         for flag in brush_session.FLAGS:
             setattr(obj.skinwright, flag, False)

@@ -8,7 +8,7 @@ from ...scene import changes
 from ...stored import keeping
 from . import brush_session, ending, held_input, keep_alive, status, timers
 from .brush_session import BrushSession, Message
-from .ending import Ending
+from .ending import Ending, remember
 
 _KEYS = {"RET": "KEEP", "NUMPAD_ENTER": "KEEP", "ESC": "CANCEL"}
 
@@ -43,7 +43,7 @@ class SessionOperator(Operator):
             session = self.make(context)
             keeping.keep_before([session.target()], session.label)
         except Refused as error:
-            self.report({"ERROR"}, str(error))
+            self._tell([Message("ERROR", str(error))])
             return None
         # The way back from the session leads to the first of these steps, the second is where its strokes begin.
         bpy.ops.ed.undo_push(message=f"Before {session.label}")
@@ -128,6 +128,7 @@ class SessionOperator(Operator):
         return {"FINISHED"}
 
     def _tell(self, messages: list[Message]) -> None:
+        remember(self.bl_label, messages)
         for message in messages:
             self.report({message.level}, message.text)
 
@@ -147,7 +148,7 @@ def shut_down(operator: str) -> None:
     """The operator's class goes: end its session first."""
     session = brush_session.current
     if session and session.operator == operator:
-        ending.end(bpy.context, session, Ending.ASIDE)
+        remember(session.label, ending.end(bpy.context, session, Ending.ASIDE))
 
 
 def _is_under_the_brush(context: Context, session: BrushSession) -> bool:

@@ -53,6 +53,12 @@ def _go_on() -> None:
             _restore()
 
 
+def position() -> int | None:
+    """Where Blender's undo stands, which Blender tells since 5.3."""
+    stack = getattr(bpy.context.window_manager, "undo_stack", None)
+    return stack.active_index if stack else None
+
+
 def leave_session() -> None:
     """Undo until before the session that has just ended. Raises RuntimeError if Blender remembers no such state."""
     with _no_handlers():

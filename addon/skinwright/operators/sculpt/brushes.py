@@ -9,12 +9,10 @@ from bpy.types import Context, Event, Object
 from ...errors import Refused
 from ...scene import modes
 from ...sculpt import session as sculpt_session
-from ...sculpt.session import Outcome, SculptOptions, SculptSession
+from ...sculpt.session import ADVICE, POOR, Outcome, SculptOptions, SculptSession
+from ..modal import undo
 from ..modal.brush_session import BrushSession, Message
 from .watch import StrokeWatch
-
-# Below this share of a sculpt reached, weights are not what is missing.
-POOR = 0.3
 
 
 class SculptBrushes(BrushSession):
@@ -33,6 +31,8 @@ class SculptBrushes(BrushSession):
         self.session = SculptSession(obj, options)
         self.news = "sculpt, and the weights follow"
         self._was_changed = False
+        # Blender's undo step of each stroke, also of those taken back.
+        self._stroke_at: list[int] = []
 
     def enter(self, _context: Context) -> None:
         """Sculpt mode, and the mesh ready for strokes."""
@@ -70,6 +70,8 @@ class SculptBrushes(BrushSession):
             self.news = str(error)
             return
         if outcome:
+            del self._stroke_at[self.session.stroke_count - 1 :]
+            self._stroke_at.append(undo.position() or 0)
             self.news = _sentence(outcome)
 
     def settle(self, context: Context) -> None:
@@ -89,8 +91,19 @@ class SculptBrushes(BrushSession):
         if self.changed_elsewhere(self.target()):
             return
         if brushing and not self._was_changed:
-            self.step(context, back)
+            self._follow(context, back, undo.position())
         self.session.assert_state()
+
+    def _follow(self, context: Context, back: bool, now: int | None) -> None:
+        """Take back or redo the strokes between the session and Blender's step `now`; one, where that is not known."""
+        if now is None:
+            self.step(context, back)
+            return
+        session, at = self.session, self._stroke_at
+        while back and session.stroke_count and at[session.stroke_count - 1] > now:
+            self.step(context, back)
+        while not back and session.stroke_count < len(at) and at[session.stroke_count] <= now:
+            self.step(context, back)
 
     def _count(self) -> str:
         count = self.session.stroke_count
@@ -131,4 +144,4 @@ def _sentence(outcome: Outcome) -> str:
     reached = f"{outcome.vertices} vertices, {outcome.reachability:.0%} of the sculpt reached"
     if outcome.reachability >= POOR:
         return reached
-    return f"{reached}: bend the joint further, lower Stiffness, or set Leftover to Shape Key"
+    return f"{reached}. {ADVICE}"
