@@ -8,6 +8,7 @@ from . import (
     match,
     panel_buttons,
     presets,
+    refine,
     retarget_weights,
     sculpt,
     stored_weights,
