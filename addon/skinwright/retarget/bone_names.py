@@ -29,29 +29,32 @@ def _trunk(*names: str) -> dict[str, str]:
 CONVENTIONS: dict[str, tuple[dict[str, str], str, str]] = {
     "Mixamo": (
         _trunk("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
-        | _limbs(*(f"{{S}}{n}" for n in "Shoulder Arm ForeArm Hand UpLeg Leg Foot ToeBase".split()))
+        | _limbs(*(f"{{S}}{n}" for n in ["Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase"]))
         | _fingers("{S}Hand{name}{joint}", ("Thumb", "Index", "Middle", "Ring", "Pinky")),
         "Left",
         "Right",
     ),
     "Unreal": (
         _trunk("pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head")
-        | _limbs(*(f"{n}_{{S}}" for n in "clavicle upperarm lowerarm hand thigh calf foot ball".split()))
+        | _limbs(*(f"{n}_{{S}}" for n in ["clavicle", "upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "ball"]))
         | _fingers("{name}_0{joint}_{S}"),
         "l",
         "r",
     ),
     "Rigify": (
         _trunk("spine", "spine.001", "spine.002", "spine.003", "spine.004", "spine.006")
-        | _limbs(*(f"{n}.{{S}}" for n in "shoulder upper_arm forearm hand thigh shin foot toe".split()))
+        | _limbs(*(f"{n}.{{S}}" for n in ["shoulder", "upper_arm", "forearm", "hand", "thigh", "shin", "foot", "toe"]))
         | _fingers("{name}.0{joint}.{S}", ("thumb", "f_index", "f_middle", "f_ring", "f_pinky")),
         "L",
         "R",
     ),
     "VRoid": (
-        _trunk(*(f"J_Bip_C_{n}" for n in "Hips Spine Chest UpperChest Neck Head".split()))
+        _trunk(*(f"J_Bip_C_{n}" for n in ["Hips", "Spine", "Chest", "UpperChest", "Neck", "Head"]))
         | _limbs(
-            *(f"J_Bip_{{S}}_{n}" for n in "Shoulder UpperArm LowerArm Hand UpperLeg LowerLeg Foot ToeBase".split())
+            *(
+                f"J_Bip_{{S}}_{n}"
+                for n in ["Shoulder", "UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot", "ToeBase"]
+            )
         )
         | _fingers("J_Bip_{S}_{name}{joint}", ("Thumb", "Index", "Middle", "Ring", "Little")),
         "L",
@@ -59,28 +62,37 @@ CONVENTIONS: dict[str, tuple[dict[str, str], str, str]] = {
     ),
     "VRM": (
         _trunk("hips", "spine", "chest", "upperChest", "neck", "head")
-        | _limbs(*(f"{{S}}{n}" for n in "Shoulder UpperArm LowerArm Hand UpperLeg LowerLeg Foot Toes".split()))
+        | _limbs(
+            *(f"{{S}}{n}" for n in ["Shoulder", "UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot", "Toes"])
+        )
         | _fingers("{S}{name}{joint}", ("Thumb", "Index", "Middle", "Ring", "Little")),
         "left",
         "right",
     ),
     "MMD": (
         _trunk("下半身", "上半身", "上半身2", "", "首", "頭")
-        | _limbs(*(f"{{S}}{n}" for n in "肩 腕 ひじ 手首 足 ひざ 足首 足先EX".split()))
+        | _limbs(*(f"{{S}}{n}" for n in ["肩", "腕", "ひじ", "手首", "足", "ひざ", "足首", "足先EX"]))
         | _fingers("{S}{name}{joint}", ("親指", "人指", "中指", "薬指", "小指")),
         "左",
         "右",
     ),
     "Character Creator": (
-        _trunk(*(f"CC_Base_{n}" for n in "Pelvis Waist Spine01 Spine02 NeckTwist01 Head".split()))
-        | _limbs(*(f"CC_Base_{{S}}_{n}" for n in "Clavicle Upperarm Forearm Hand Thigh Calf Foot ToeBase".split()))
+        _trunk(*(f"CC_Base_{n}" for n in ["Pelvis", "Waist", "Spine01", "Spine02", "NeckTwist01", "Head"]))
+        | _limbs(
+            *(
+                f"CC_Base_{{S}}_{n}"
+                for n in ["Clavicle", "Upperarm", "Forearm", "Hand", "Thigh", "Calf", "Foot", "ToeBase"]
+            )
+        )
         | _fingers("CC_Base_{S}_{name}{joint}", ("Thumb", "Index", "Mid", "Ring", "Pinky")),
         "L",
         "R",
     ),
     "Daz": (
         _trunk("pelvis", "abdomenLower", "abdomenUpper", "chestLower", "neckLower", "head")
-        | _limbs(*(f"{{S}}{n}" for n in "Collar ShldrBend ForearmBend Hand ThighBend Shin Foot Toe".split()))
+        | _limbs(
+            *(f"{{S}}{n}" for n in ["Collar", "ShldrBend", "ForearmBend", "Hand", "ThighBend", "Shin", "Foot", "Toe"])
+        )
         | _fingers("{S}{name}{joint}", ("Thumb", "Index", "Mid", "Ring", "Pinky")),
         "l",
         "r",
@@ -88,7 +100,10 @@ CONVENTIONS: dict[str, tuple[dict[str, str], str, str]] = {
     "MakeHuman": (
         _trunk("root", "spine05", "spine03", "spine01", "neck01", "head")
         | _limbs(
-            *(f"{n}.{{S}}" for n in "clavicle upperarm01 lowerarm01 wrist upperleg01 lowerleg01 foot toe1-1".split())
+            *(
+                f"{n}.{{S}}"
+                for n in ["clavicle", "upperarm01", "lowerarm01", "wrist", "upperleg01", "lowerleg01", "foot", "toe1-1"]
+            )
         )
         | {f"{f}{j}": f"finger{k}-{j}.{{S}}" for k, f in enumerate(_FINGERS, 1) for j in (1, 2, 3)},
         "L",
@@ -96,7 +111,12 @@ CONVENTIONS: dict[str, tuple[dict[str, str], str, str]] = {
     ),
     "Quaternius": (
         _trunk("Hips", "Abdomen", "Torso", "Chest", "Neck", "Head")
-        | _limbs(*(f"{n}.{{S}}" for n in "Shoulder UpperArm LowerArm Wrist UpperLeg LowerLeg Foot Toe".split()))
+        | _limbs(
+            *(
+                f"{n}.{{S}}"
+                for n in ["Shoulder", "UpperArm", "LowerArm", "Wrist", "UpperLeg", "LowerLeg", "Foot", "Toe"]
+            )
+        )
         | _fingers("{name}{joint}.{S}", ("Thumb", "Index", "Middle", "Ring", "Pinky")),
         "L",
         "R",
@@ -113,7 +133,7 @@ def plain(name: str) -> str:
 
 
 def side(name: str) -> str:
-    """ "L", "R", or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
+    """The letter L or R, or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
     bare = _PREFIX.sub("", unicodedata.normalize("NFKC", name))
     if bare[:1] in "左右":
         return _SIDES[bare[0]]

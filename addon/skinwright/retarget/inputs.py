@@ -19,7 +19,7 @@ from .params import RetargetParams
 
 @dataclass(frozen=True)
 class Character:
-    """An armature, its deforming bones, and meshes laid end to end: vertices of the k-th are starts[k] to starts[k + 1]."""
+    """An armature, its deforming bones, and meshes end to end: the k-th has vertices starts[k] to starts[k + 1]."""
 
     armature: bpy.types.Object
     bones: RestBones
@@ -54,7 +54,8 @@ def read_pair(
     taker = _target(targets)
     if giver.armature == taker.armature:
         raise SceneError(
-            f"{giver.armature.name} deforms the source and the target: use Transfer Weights between meshes of one armature"
+            f"{giver.armature.name} deforms the source and the target: use Transfer Weights between meshes of "
+            "one armature"
         )
     for obj in targets:
         sculpting.check_editable(obj)

@@ -105,6 +105,12 @@ pub enum Error {
         "the two characters have no weighted bone in common: map at least one bone of the target to a bone of the source"
     )]
     NoCommonBones,
+    /// Bones that cannot be used.
+    #[error("the skeleton cannot be used: {reason}")]
+    InvalidSkeleton {
+        /// What is wrong, and what to do about it.
+        reason: String,
+    },
     /// A mesh without an inside for tetrahedra.
     #[error(
         "the mesh encloses nothing: no tetrahedron lies inside of it; it needs thickness, and normals that point outwards"

@@ -6,8 +6,10 @@
 #![forbid(unsafe_code)]
 
 pub mod adjacency;
+pub mod autoskin;
 pub mod biharmonic;
 pub mod desparsify;
+pub mod embed;
 pub mod error;
 pub mod fill;
 pub mod inside;
@@ -16,6 +18,7 @@ pub mod mesh;
 pub mod penetration;
 pub mod progress;
 pub mod refine;
+mod registration;
 pub mod retarget;
 pub mod sculpt;
 pub mod skinning;

@@ -67,7 +67,7 @@ fn method_of(name: &str) -> PyResult<Method> {
 }
 
 /// Head and tail of every bone from a (B, 2, 3) array.
-fn segments(array: &Stack<'_, f32>) -> PyResult<Vec<[[f32; 3]; 2]>> {
+pub(crate) fn segments(array: &Stack<'_, f32>) -> PyResult<Vec<[[f32; 3]; 2]>> {
     let &[_, 2, 3] = array.shape() else {
         let shape = array.shape();
         return Err(InvalidParameter::new_err(format!("bone_segments must have shape (B, 2, 3), not {shape:?}")));

@@ -35,6 +35,7 @@ pub fn to_python(error: Error) -> PyErr {
         }
         Error::LengthMismatch { .. }
         | Error::InvalidParameter { .. }
+        | Error::InvalidSkeleton { .. }
         | Error::UnusableBone { .. }
         | Error::NoCommonBones => InvalidParameter::new_err(sentence),
         Error::NotPositiveDefinite { .. } => NotSolvable::new_err(sentence),

@@ -1,8 +1,10 @@
 //! The Python module `skinwright_native`: one file per class or operation, and this list.
 
 mod arrays;
+mod autoskin;
 mod biharmonic;
 mod desparsify;
+mod embed;
 mod error;
 mod fill;
 mod inpainting;
@@ -25,9 +27,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod skinwright_native {
     #[pymodule_export]
+    use crate::autoskin::{AutoWeights, automatic_weights, start_automatic_weights};
+    #[pymodule_export]
     use crate::biharmonic::biharmonic_embedding;
     #[pymodule_export]
     use crate::desparsify::desparsify;
+    #[pymodule_export]
+    use crate::embed::{Embedding, embed_skeleton, start_embed_skeleton};
     #[pymodule_export]
     use crate::error::{
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
