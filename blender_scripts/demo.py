@@ -44,6 +44,7 @@ def main() -> None:
     errors = compare(base, {"nearest point": before, "Skinwright": after})
 
     stage([before, after])
+    demo_scene.look_at(after)
     arguments.out.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(arguments.out / "demo.blend"), compress=True)
     demo_picture.render(arguments.out / "demo.png", arguments.samples)

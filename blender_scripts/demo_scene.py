@@ -92,6 +92,21 @@ def pose(rig: bpy.types.Object, directions: dict[str, tuple[float, float, float]
         bpy.context.view_layer.update()
 
 
+def look_at(character: Character) -> None:
+    """Let the file open in the camera's view, the body picked as source, a garment active, the sidebar at our tab."""
+    scene = bpy.context.scene
+    scene.skinwright.transfer.source = character.body
+    scene["skinwright_show_tab"] = True
+    garment = next(iter(character.garments.values()))
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == garment)
+    bpy.context.view_layer.objects.active = garment
+    for screen in bpy.data.screens:
+        for area in (area for area in screen.areas if area.type == "VIEW_3D"):
+            area.spaces.active.region_3d.view_perspective = "CAMERA"
+            area.spaces.active.show_region_ui = True
+
+
 def _build_armature(bones: list[Bone], name: str, collection: bpy.types.Collection) -> bpy.types.Object:
     rig = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     collection.objects.link(rig)

@@ -40,7 +40,8 @@ def from_entries(vertex: NDArray, bone: NDArray, value: NDArray, n_rows: int) ->
     return Rows(indptr.astype(np.uint32), (place % width).astype(np.uint32), total.astype(np.float32))
 
 
-def _keep(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
+def keep_entries(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
+    """The entries marked in `kept` (nnz,)."""
     if kept.all():
         return rows
     indptr = np.concatenate([[0], np.cumsum(kept, dtype=np.int64)])[rows.indptr]
@@ -49,7 +50,7 @@ def _keep(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
 
 def keep_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
     """The entries whose bone is marked in `columns` (B,)."""
-    return _keep(rows, columns[rows.bones])
+    return keep_entries(rows, columns[rows.bones])
 
 
 def take_columns(rows: Rows, columns: NDArray[np.bool_]) -> Rows:
@@ -66,7 +67,7 @@ def keep_largest(rows: Rows, most: NDArray[np.integer]) -> Rows:
     order = np.lexsort((rows.bones, -rows.values, vertex))
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order), dtype=np.int64) - rows.indptr[vertex[order]]
-    return _keep(rows, rank < most[vertex])
+    return keep_entries(rows, rank < most[vertex])
 
 
 def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
@@ -88,3 +89,17 @@ def take_rows(rows: Rows, indices: NDArray[np.integer]) -> Rows:
     indptr = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
     entries = np.arange(indptr[-1], dtype=np.int64) + np.repeat(rows.indptr[indices] - indptr[:-1], counts)
     return Rows(indptr.astype(np.uint32), rows.bones[entries], rows.values[entries])
+
+
+def replace_rows(rows: Rows, indices: NDArray[np.integer], new: Rows) -> Rows:
+    """`rows` with row r of `new` in place of row indices[r]; entries ascend by bone in each row."""
+    vertex = entry_vertices(rows)
+    kept = ~np.isin(vertex, indices)
+    vertex = np.concatenate([vertex[kept], np.asarray(indices, np.int64)[entry_vertices(new)]])
+    bones, values = (
+        np.concatenate([old[kept], now]) for old, now in ((rows.bones, new.bones), (rows.values, new.values))
+    )
+    order = np.lexsort((bones, vertex))
+    counts = np.bincount(vertex, minlength=len(rows.indptr) - 1)
+    indptr = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+    return Rows(indptr.astype(np.uint32), bones[order], values[order])

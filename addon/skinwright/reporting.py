@@ -1,6 +1,7 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -42,7 +43,7 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched{self._within()}"]
         counts.append(f"{self._sum('inpainted')} inpainted")
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
@@ -57,6 +58,11 @@ class Report:
         groups = f"{self._sum('groups')} groups written, {created} of them new"
         compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
         return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
+
+    def _within(self) -> str:
+        """The distance in force, if it is one for all."""
+        distances = {f"{g.native['max_distance']:.3g}" for g in self.garments if "max_distance" in g.native}
+        return f" within {distances.pop()}" if len(distances) == 1 else ""
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)
@@ -95,6 +101,28 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@dataclass(frozen=True)
+class AutoskinReport:
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
+
+    target: str
+    armature: str
+    vertices: int
+    bones: int
+    outside: list[str]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return f"{self.target}: {self.vertices} vertices have weights for {self.bones} bones of {self.armature}"
+
+    def warnings(self) -> list[str]:
+        """What is worth a look."""
+        if not self.outside:
+            return []
+        named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
+        return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
 
 
 @dataclass(frozen=True)
@@ -142,3 +170,31 @@ class SculptReport:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return _plain(vars(self)) | {"sentence": self.sentence()}
+
+
+@dataclass(frozen=True)
+class LastResult:
+    """What the operator `title` has done or refused, for the panel: a report in the status bar is gone in seconds."""
+
+    title: str
+    sentence: str
+    warnings: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()
+    failed: bool = False
+
+
+last: LastResult | None = None
+
+
+def remember(
+    title: str, sentence: str, warnings: Sequence[str] = (), *, facts: Sequence[str] = (), failed: bool = False
+) -> None:
+    """Show this in the panel until the next result."""
+    global last
+    last = LastResult(title, sentence, tuple(warnings), tuple(facts), failed)
+
+
+def forget() -> None:
+    """Show nothing."""
+    global last
+    last = None

@@ -21,6 +21,10 @@ def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
     assert 0 < seen["reachability"] <= 1
 
 
+def test_no_session_is_lost_and_none_is_left_behind(blender):
+    assert len(blender.run("sessions", timeout=900, size=(700, 520))["passed"]) == 13
+
+
 def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
     seen = blender.run("sculpt_release", timeout=200, size=(640, 480), real_mouse=True)
     assert seen["brush down"] > 0

@@ -151,7 +151,10 @@ class TestPainting:
         coat.vertex_groups.active_index = 1
         self.before = builders.weights(coat)
         mask_painting = import_module(f"{PACKAGE}.match.painting")
-        return mask_painting.MaskPainting(bpy.context, coat, params())
+        painting = mask_painting.MaskPainting(bpy.context, coat, params())
+        assert builders.weights(coat) == self.before and not coat.skinwright.mask_group, "preparing has written"
+        painting.open(bpy.context)
+        return painting
 
     def settle(self, painting):
         changes = import_module(f"{PACKAGE}.scene.changes")
@@ -165,10 +168,9 @@ class TestPainting:
             time.sleep(0.002)
         raise AssertionError("nothing was solved")
 
-    def test_begins_in_weight_paint_mode_on_the_mask(self, coat, painting):
-        assert coat.mode == "WEIGHT_PAINT"
+    def test_begins_on_the_mask(self, coat, painting):
         assert coat.vertex_groups.active.name == "Match Mask"
-        painting.cancel(bpy.context)
+        painting.restore()
 
     def test_weights_follow_the_mask(self, coat, painting):
         self.settle(painting)
@@ -176,7 +178,7 @@ class TestPainting:
         transfer = import_module(f"{PACKAGE}.transfer").transfer_weights
         coat.vertex_groups["Match Mask"].add(list(range(9)), 0.0, "REPLACE")
         self.settle(painting)
-        painting.finish(bpy.context)
+        painting.finish()
         followed = builders.weights(coat)
         assert followed != first
         transfer(bpy.context, bpy.context.scene.skinwright.transfer.source, [coat], params())
@@ -190,11 +192,11 @@ class TestPainting:
         painting.expect_stroke()
         assert painting.tick(params(), True)
         assert builders.weights(coat) != first
-        painting.cancel(bpy.context)
+        painting.restore()
 
-    def test_finish_restores_mode_group_and_overlay(self, coat, painting):
-        painting.finish(bpy.context)
-        assert coat.mode == "OBJECT"
+    def test_finish_restores_group_and_overlay(self, coat, painting):
+        painting.finish()
+        painting.close(bpy.context)
         assert coat.vertex_groups.active.name == "Old"
         assert bpy.context.scene.skinwright.overlay.kind == "NONE"
         assert coat.skinwright.mask_group == "Match Mask"
@@ -202,11 +204,17 @@ class TestPainting:
     def test_cancel_restores_everything_bit_for_bit(self, coat, painting):
         self.settle(painting)
         assert builders.weights(coat) != self.before
-        painting.cancel(bpy.context)
+        painting.restore()
         assert builders.weights(coat) == self.before
         assert [group.name for group in coat.vertex_groups] == ["Arm.L", "Old"]
         assert coat.skinwright.mask_group == ""
-        assert coat.mode == "OBJECT"
+
+    def test_a_target_without_an_armature_gets_the_sources_for_the_time(self, coat, painting):
+        armature = bpy.context.scene.skinwright.transfer.source.modifiers["Armature"].object
+        assert painting.armature_added == (coat.modifiers[0].object == armature)
+        assert painting.armature_added
+        painting.restore()
+        assert not coat.modifiers
 
     def test_a_mask_without_any_match_leaves_weights_and_says_why(self, coat, painting):
         self.settle(painting)
@@ -217,7 +225,7 @@ class TestPainting:
         assert "Coat" in painting.problem
         after = builders.weights(coat)
         assert [row["Arm.L"] for row in after] == [row["Arm.L"] for row in before]
-        painting.cancel(bpy.context)
+        painting.restore()
 
 
 class TestRefusedMeansUnchanged:
@@ -254,3 +262,9 @@ class TestRefusedMeansUnchanged:
         with pytest.raises(RuntimeError, match="Internal error .KeyError: 'x'."):
             bpy.ops.skinwright.edit_match_mask(action="CLEAR")
         assert ([group.name for group in coat.vertex_groups], coat.skinwright.mask_group) == before
+
+
+def test_a_mirrored_half_is_previewed_by_its_own_vertices(scene, coat):
+    coat.modifiers.new("Mirror", "MIRROR")
+    for operator in ("preview_match", "store_match", "select_match"):
+        assert getattr(bpy.ops.skinwright, operator)() == {"FINISHED"}

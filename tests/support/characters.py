@@ -116,10 +116,9 @@ def skinned(positions: np.ndarray, weights: np.ndarray, pose: np.ndarray) -> np.
 def gltf_character(path: Path) -> Character:
     """All skinned meshes of a .glb file as one, equal positions merged, with the skeleton of its first skin.
 
-    A bone reaches along its own Y axis as far as its best aligned child, a leaf half as far as its parent is away.
+    A bone reaches along its own Y axis as far as its best aligned child; a leaf half the step from its parent.
     """
-    sys.path.append(str(ROOT / "tests"))
-    from native import glb
+    from support import glb
 
     body = glb.joined([mesh for mesh in glb.read_meshes(path) if mesh.weights is not None])
     names, parents, frames = _skeleton(path)
@@ -138,7 +137,7 @@ def gltf_character(path: Path) -> Character:
 
 
 def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
-    from native.glb import _accessor
+    from support.glb import _accessor
 
     blob = path.read_bytes()
     length = struct.unpack_from("<I", blob, 12)[0]

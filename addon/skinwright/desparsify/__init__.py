@@ -58,7 +58,8 @@ def _compute(obj: bpy.types.Object, params: DesparsifyParams) -> _Answer:
     names = [bone.name for bone in rig.data.bones]
     deforming = np.isin(names, sorted(armature.deform_bones(rig)))
     before = csr.keep_columns(vertex_groups.read(obj, names), deforming)
-    after = _solve(obj, rig, names, deforming, before, params)
+    locked = ~deforming | np.isin(names, sorted(vertex_groups.locked(obj)))
+    after = _solve(obj, rig, names, locked, before, params)
     vertices = (
         np.flatnonzero(mesh.selected(obj))
         if params.selected_only
@@ -67,6 +68,17 @@ def _compute(obj: bpy.types.Object, params: DesparsifyParams) -> _Answer:
     free = deforming & ~np.isin(names, sorted(vertex_groups.locked(obj)))
     soundness.check_sums(obj.name, after, free)
     return _Answer(names, vertices, csr.take_rows(before, vertices), csr.take_rows(after, vertices))
+
+
+def nearest_bones(
+    obj: bpy.types.Object, rig: bpy.types.Object, names: list[str], rows: Rows, params: DesparsifyParams
+) -> Rows:
+    """Rows over the bones `names` with the n members that desparsification would leave; nothing is written."""
+    all_names = [bone.name for bone in rig.data.bones]
+    index = np.array([all_names.index(name) for name in names], np.uint32)
+    locked = ~np.isin(all_names, names) | np.isin(all_names, sorted(vertex_groups.locked(obj)))
+    after = _solve(obj, rig, all_names, locked, rows._replace(bones=index[rows.bones]), params)
+    return csr.take_columns(after, np.isin(all_names, names))
 
 
 def _check(obj: bpy.types.Object) -> bpy.types.Object:
@@ -83,12 +95,11 @@ def _solve(
     obj: bpy.types.Object,
     rig: bpy.types.Object,
     names: list[str],
-    deforming: NDArray[np.bool_],
+    locked: NDArray[np.bool_],
     before: Rows,
     params: DesparsifyParams,
 ) -> Rows:
     """Bones that do not deform take part as steps of the hierarchy, but are given to no vertex."""
-    locked = ~deforming | np.isin(names, sorted(vertex_groups.locked(obj)))
     shape: dict[str, NDArray] = {}
     if params.method == "surface":
         shape["positions"], shape["triangles"] = mesh.rest_positions(obj.data), mesh.triangles(obj)

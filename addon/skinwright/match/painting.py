@@ -9,7 +9,7 @@ import time
 import bpy
 
 from .. import jobs, native
-from ..scene import brush, changes, mask, vertex_groups, weight_state
+from ..scene import armature, brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
 from .session import MatchSession
@@ -32,20 +32,13 @@ class MaskPainting:
     """The weights as they were, and the solve that follows the mask."""
 
     def __init__(self, context: bpy.types.Context, target: bpy.types.Object, params: TransferParams) -> None:
-        """Show the match and go to Weight Paint mode on the mask. Raises SceneError or native.NativeError."""
+        """Prepare; nothing is written. Raises SceneError or native.NativeError."""
         settings = context.scene.skinwright
+        mask.check(target)
         self.before = weight_state.capture(target)
-        self.mask_group, self.mode, self.overlay = target.skinwright.mask_group, target.mode, settings.overlay.kind
-        try:
-            group = mask.ensure(target)
-            self.session = MatchSession(settings.transfer.source, target, params)
-        except (SceneError, native.NativeError):
-            self._restore(target)
-            raise
-        target.vertex_groups.active = target.vertex_groups[group]
-        settings.overlay.kind = "MATCH"
-        if target.mode != "WEIGHT_PAINT":
-            bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        self.mask_group, self.overlay = target.skinwright.mask_group, settings.overlay.kind
+        self.session = MatchSession(settings.transfer.source, target, params)
+        self.source = settings.transfer.source.name if params.add_armature else ""
         self.problem = ""
         # When weights were written, and how long after the mask had been seen to have changed.
         self.written_at: list[float] = []
@@ -53,12 +46,32 @@ class MaskPainting:
         self._runner: jobs.Runner | None = None
         self._asked: tuple = ()
         self._since = 0.0
-        self._undone = changes.undone
+        self._modifiers: list[str] = []
         self.expect_stroke()
+
+    def open(self, context: bpy.types.Context) -> None:
+        """Show the match, and make the mask the group that is painted."""
+        target = self.session.target()
+        group = mask.ensure(target)
+        target.vertex_groups.active = target.vertex_groups[group]
+        context.scene.skinwright.overlay.kind = "MATCH"
+        source = bpy.data.objects.get(self.source)
+        if source and armature.find(source) and armature.find(target) is None:
+            # Else the artist would see no weight at work.
+            self._modifiers = armature.attach(target, source)
+
+    @property
+    def armature_added(self) -> bool:
+        """Whether the target had no armature and now has the source's."""
+        return bool(self._modifiers)
 
     def expect_stroke(self) -> None:
         """A brush is down or may come down: the mask is to be read before Blender evaluates and counts the change."""
         self._version = -1
+
+    def undone(self) -> None:
+        """Undo has brought back old weights with the old mask."""
+        self._asked, self.session.written = (), None
 
     def tick(self, params: TransferParams, live: bool) -> bool:
         """Start, take in, or leave alone the solve; gives whether weights were written."""
@@ -68,9 +81,6 @@ class MaskPainting:
         if self._version != changes.version:
             self._version = changes.version
             self.session.read_mask(target)
-        if self._undone != changes.undone:
-            # Undo has brought back old weights with the old mask.
-            self._undone, self._asked, self.session.written = changes.undone, (), None
         asked = (self.session.mask_version, params)
         if live and asked != self._asked:
             self._asked = asked
@@ -114,27 +124,30 @@ class MaskPainting:
                 self._runner.cancel()
             self._runner, self.session.solving = None, False
 
-    def finish(self, context: bpy.types.Context) -> None:
-        """Keep mask and weights; mode, active group and overlay become what they were."""
+    def stop(self) -> None:
+        """Leave the solve that is going on; what it would have written is not."""
+        self._stop()
+
+    def finish(self) -> None:
+        """Keep mask and weights; the active group becomes what it was."""
         self._stop()
         target = self.session.target()
         if target:
-            self._leave(context, target)
             vertex_groups.activate(target, self.before.active)
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        """The same, with every weight as it was, bit for bit."""
+    def restore(self) -> None:
+        """Every weight, the mask and the modifiers as they were, bit for bit. Raises SceneError for another mesh."""
         self._stop()
         target = self.session.target()
-        if target:
-            self._leave(context, target)
-            self._restore(target)
-
-    def _leave(self, context: bpy.types.Context, target: bpy.types.Object) -> None:
-        context.scene.skinwright.overlay.kind = self.overlay
-        if context.object == target and target.mode != self.mode:
-            bpy.ops.object.mode_set(mode=self.mode)
-
-    def _restore(self, target: bpy.types.Object) -> None:
+        if target is None:
+            raise SceneError(f"{self.session.target_name} has another number of vertices than before")
         weight_state.apply(target, self.before)
         target.skinwright.mask_group = self.mask_group
+        for name in self._modifiers:
+            if name in target.modifiers:
+                target.modifiers.remove(target.modifiers[name])
+
+    def close(self, context: bpy.types.Context) -> None:
+        """The overlay becomes what it was."""
+        self._stop()
+        context.scene.skinwright.overlay.kind = self.overlay

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..jobs import Jobs
-from ..scene import mask, vertex_groups
+from ..scene import identity, mask, vertex_groups
 from ..transfer.checks import check_objects
 from ..transfer.compute import Result, bone_rows, bone_source, prepare, to_result
 from ..transfer.inputs import read_body, read_garment, read_mask
@@ -51,11 +51,12 @@ class MatchSession:
     def __init__(self, source: bpy.types.Object, target: bpy.types.Object, params: TransferParams) -> None:
         """Raises SceneError or native.NativeError with a sentence."""
         check_objects(source, [target], params)
-        self.source_name, self.target_name = source.name, target.name
+        self.source_name = source.name
+        self.object = identity.of(target)
         self.body = read_body(source, params)
         self.garment = read_garment(target, self.body, params)
         self.inpainting = prepare(bone_source(self.body), self.garment, params)
-        self.n_vertices = len(self.garment.geometry.positions)
+        self.n_vertices = self.garment.completion.n_own
         self.mask = np.full(self.n_vertices, mask.AUTOMATIC, np.uint8)
         self.mask_version = 0
         self.read_mask(target)
@@ -65,9 +66,15 @@ class MatchSession:
         # While a job solves, asking for the match would wait for it.
         self.solving = False
 
+    @property
+    def target_name(self) -> str:
+        """The target's present name."""
+        self.object.find()
+        return self.object.name
+
     def target(self) -> bpy.types.Object | None:
         """The target, while it is there with as many vertices as it had."""
-        obj = bpy.data.objects.get(self.target_name)
+        obj = self.object.find()
         fits = obj is not None and obj.type == "MESH" and len(obj.data.vertices) == self.n_vertices
         return obj if fits else None
 

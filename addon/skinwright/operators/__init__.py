@@ -1,27 +1,34 @@
 """Operators, one file or folder per feature."""
 
 from . import (
+    automatic_weights,
     bone_map,
     check_weights,
     desparsify,
     match,
+    panel_buttons,
     presets,
     retarget_weights,
     sculpt,
     stored_weights,
     transfer_weights,
 )
-from .modal import timers
+from .modal import keep_alive, timers, undo
 
 MODULES = (
     timers,
+    keep_alive,
+    undo,
     transfer_weights,
     presets,
     *match.MODULES,
     check_weights,
+    automatic_weights,
     desparsify,
     *sculpt.MODULES,
+    *refine.MODULES,
     stored_weights,
+    panel_buttons,
     retarget_weights,
     bone_map,
 )

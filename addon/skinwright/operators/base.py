@@ -4,18 +4,13 @@ from collections.abc import Callable, Sequence
 
 from bpy.types import Context, Object, Operator
 
-from .. import native
+from .. import native, reporting
 from ..errors import Refused, internal
 from ..stored import keeping
+from .modal import brush_session
 
 # The modes of operators that work on meshes as they are selected.
 MESH_MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
-
-# Operators that hold weights of their own while they run.
-_SESSIONS = {
-    "SKINWRIGHT_OT_sculpt_weights": "Sculpt Weights",
-    "SKINWRIGHT_OT_paint_match_mask": "Paint Match Mask",
-}
 
 
 class SkinwrightOperator(Operator):
@@ -46,10 +41,14 @@ class SkinwrightOperator(Operator):
         try:
             return work()
         except Refused as refused:
-            self.report({"ERROR"}, str(refused))
+            self._fail(str(refused))
         except Exception as error:
-            self.report({"ERROR"}, f"{self.bl_label}: {internal(error)}")
+            self._fail(f"{self.bl_label}: {internal(error)}")
         return {"CANCELLED"}
+
+    def _fail(self, sentence: str) -> None:
+        reporting.remember(self.bl_label, sentence, failed=True)
+        self.report({"ERROR"}, sentence)
 
     def keep_before(self, objects: Sequence[Object]) -> None:
         """Keep the weights of `objects` in the file, as they are before this operator writes."""
@@ -57,6 +56,7 @@ class SkinwrightOperator(Operator):
 
     def tell(self, sentence: str, warnings: list[str]) -> set[str]:
         """The result, and then what is worth a look, as the status bar shows the last report."""
+        reporting.remember(self.bl_label, sentence, warnings)
         self.report({"INFO"}, sentence)
         for warning in warnings:
             self.report({"WARNING"}, warning)
@@ -76,16 +76,8 @@ def refusal_in_mode(context: Context, purpose: str) -> str:
     """Why nothing can be done to meshes now, or nothing; `purpose` ends the sentence."""
     if native.problem():
         return native.problem()
-    session = session_under_way(context)
-    if session:
-        return f"End {session} first: its weights would be written over these, or these over its"
+    if brush_session.refusal():
+        return brush_session.refusal()
     if context.mode not in MESH_MODES:
         return f"Go to Object, Edit or Weight Paint mode to {purpose}"
     return ""
-
-
-def session_under_way(context: Context) -> str:
-    """The label of the operator that sculpts or paints in some window, or nothing."""
-    windows = context.window_manager.windows
-    running = {operator.bl_idname for window in windows for operator in window.modal_operators}
-    return next((label for name, label in _SESSIONS.items() if name in running), "")

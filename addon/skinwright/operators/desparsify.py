@@ -14,8 +14,10 @@ class SKINWRIGHT_OT_desparsify(DesparsifySettings, SkinwrightOperator):
     """The operator; all of the work is in the function it calls."""
 
     bl_idname = "skinwright.desparsify"
-    bl_label = "Desparsify Weights"
-    bl_description = "Give every vertex the same number of bones to choose from, the new ones with weight 0"
+    bl_label = "Add Bone Slots"
+    bl_description = (
+        "Give every vertex the same number of bones to choose from, the new ones with weight 0 (desparsify)"
+    )
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     @classmethod

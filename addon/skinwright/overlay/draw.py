@@ -8,7 +8,7 @@ from bpy.types import SpaceView3D
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
-from . import colours, legend
+from . import colours, explained, legend
 from . import picture as preview
 from .picture import Picture
 
@@ -28,12 +28,19 @@ def _picture() -> Picture | None:
     return preview.picture(context, settings.kind, context.scene.skinwright.transfer.to_params())
 
 
+def _draw_explained() -> None:
+    if bpy.context.space_data.overlay.show_overlays:
+        explained.draw()
+
+
 def _draw_mesh() -> None:
     picture = _picture()
     obj = bpy.data.objects.get(picture.object_name) if picture else None
     if picture is None or obj is None:
         return
-    batch = _batch(picture, bpy.context.scene.skinwright.overlay.opacity)
+    # Under the weight brush the mesh has Blender's colours of the mask: they would mix.
+    painted = picture.kind == "MATCH" and obj.mode == "WEIGHT_PAINT"
+    batch = _batch(picture, 1.0 if painted else bpy.context.scene.skinwright.overlay.opacity)
     offset = Matrix.Identity(4)
     offset[2][3] = -DEPTH_OFFSET
     projection = gpu.matrix.get_projection_matrix()
@@ -84,6 +91,7 @@ def register() -> None:
     load_pre.append(_forget)
     if not bpy.app.background:
         _handles.append(SpaceView3D.draw_handler_add(_draw_mesh, (), "WINDOW", "POST_VIEW"))
+        _handles.append(SpaceView3D.draw_handler_add(_draw_explained, (), "WINDOW", "POST_VIEW"))
         _handles.append(SpaceView3D.draw_handler_add(_draw_legend, (), "WINDOW", "POST_PIXEL"))
 
 

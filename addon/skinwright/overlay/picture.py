@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..check import shown as checked
 from ..check.weight_check import Fault, WeightCheck
 from ..csr import Rows
+from ..match import explain
 from ..match import session as match_session
 from ..match.session import Category, Match, MatchSession
 from ..scene import armature, changes, deformation, mesh, vertex_groups
@@ -61,7 +62,7 @@ def forget() -> None:
     """Drop what is kept between drawings."""
     global _kept, _triangles
     _kept = _triangles = None
-    match_session.current = comparing.current = None
+    match_session.current = comparing.current = explain.current = None
 
 
 def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Picture | None:
@@ -111,7 +112,7 @@ def _make(
         "positions": positions,
         "normals": normals,
         "triangles": _triangles_of(obj),
-        "note": "" if fits else "Shown at rest: a modifier changes the number of vertices",
+        "note": "" if fits else "At rest: a modifier adds vertices",
     }
     if session and match:
         return _picture_of_match(match, session, shape)
@@ -158,24 +159,24 @@ def _picture_of_faults(result: WeightCheck | None, shape: dict) -> Picture:
     """0 for a sound vertex, else the number of its worst fault, from 1."""
     values = np.zeros(len(shape["positions"]), np.int64)
     if result is None:
-        return Picture(**shape, values=values, rows=[], note="Check the weights first")
+        return Picture(**shape | {"note": "Check the weights first"}, values=values, rows=[])
     rows = [(0, f"Sound: {int((~result.any_fault()).sum()):,}")]
     for number, fault in enumerate(Fault, 1):
         values[result.faulty[fault]] = number
         if result.faulty[fault].any():
             rows.append((number, f"{fault.name.replace('_', ' ').title()}: {int(result.faulty[fault].sum()):,}"))
     worst = f"Worst: {result.worst.name}" if result.worst else "No fault in any pose"
-    return Picture(**shape, values=values, rows=rows, note=worst)
+    return Picture(**shape | {"note": worst}, values=values, rows=rows)
 
 
 def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     weights = vertex_groups.read(obj, _bone_names(obj))
     count = influences(weights)
     spare = len(weights.bones) - int(count.sum())
-    note = f"and {spare:,} members of weight 0" if spare else ""
+    notes = [shape["note"], f"and {spare:,} members of weight 0" if spare else ""]
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
-    return Picture(**shape, values=count, rows=rows, note=note)
+    return Picture(**shape | {"note": ". ".join(filter(None, notes))}, values=count, rows=rows)
 
 
 def _picture_of_difference(obj: bpy.types.Object, shape: dict) -> Picture:

@@ -107,10 +107,10 @@ def is_posed(armature: bpy.types.Object) -> bool:
     return bool(moved.max() > 1e-5 * size)
 
 
-def attach(obj: bpy.types.Object, source: bpy.types.Object) -> None:
+def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
     """Let the armatures that deform `source` deform `obj` in the same way: by modifiers of the same settings.
 
-    They come after mirroring, which needs the rest shape, and before all that builds on the pose.
+    They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
     """
     mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
     place = mirrors[-1] + 1 if mirrors else 0
@@ -124,6 +124,7 @@ def attach(obj: bpy.types.Object, source: bpy.types.Object) -> None:
     for modifier, model in zip(added, models, strict=False):
         for name in BINDING:
             setattr(modifier, name, getattr(model, name))
+    return [modifier.name for modifier in added]
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:

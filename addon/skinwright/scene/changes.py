@@ -3,9 +3,10 @@
 import bpy
 from bpy.app.handlers import depsgraph_update_post, persistent, redo_post, undo_post
 
-# How often an object, its data or its pose has changed; how often something was undone or redone.
+# How often an object, its data or its pose has changed; how often something was undone, and redone.
 version = 0
 undone = 0
+redone = 0
 
 
 @persistent
@@ -24,7 +25,14 @@ def _on_undo(*_arguments: object) -> None:
     undone += 1
 
 
-_HANDLERS = ((depsgraph_update_post, _on_update), (undo_post, _on_undo), (redo_post, _on_undo))
+@persistent
+def _on_redo(*_arguments: object) -> None:
+    global version, redone
+    version += 1
+    redone += 1
+
+
+_HANDLERS = ((depsgraph_update_post, _on_update), (undo_post, _on_undo), (redo_post, _on_redo))
 
 
 def register() -> None:

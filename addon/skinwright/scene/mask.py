@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from . import vertex_groups
+from . import symmetry, vertex_groups
 from .error import SceneError
 
 INPAINT, AUTOMATIC, FORCE_MATCH = 0, 1, 2
@@ -46,14 +46,20 @@ def read(
     return np.where(painted, INPAINT, AUTOMATIC).astype(np.uint8)
 
 
+def check(obj: bpy.types.Object) -> None:
+    """Raise SceneError for a mask that cannot be edited here."""
+    settings = obj.skinwright
+    if settings.mask_group and settings.mask_reading != Reading.STEER.value:
+        raise SceneError(f"The mask of {obj.name} is read as another tool's: set Reading to Steer to edit it here")
+
+
 def ensure(obj: bpy.types.Object) -> str:
     """Name of the group that is the object's mask, made and filled with automatic where there is none.
 
     Raises SceneError for a mask that is read in another tool's way.
     """
+    check(obj)
     settings = obj.skinwright
-    if settings.mask_group and settings.mask_reading != Reading.STEER.value:
-        raise SceneError(f"The mask of {obj.name} is read as another tool's: set Reading to Steer to edit it here")
     if settings.mask_group in obj.vertex_groups:
         return settings.mask_group
     settings.mask_group, settings.mask_reading = obj.vertex_groups.new(name=DEFAULT_GROUP).name, "STEER"
@@ -100,6 +106,13 @@ def shrink(weights: Values, edges: NDArray[np.integer]) -> Values:
     """Make the inpainted vertices automatic that have a neighbour which is not inpainted."""
     inpainted = weights < 0.25
     return with_value(weights, inpainted & _beside(~inpainted, edges), 0.5)
+
+
+def mirrored(weights: Values, positions: NDArray[np.float32], side: int) -> Values:
+    """The mask of the side where x * `side` > 0 on the other as well; a vertex without a partner keeps its own."""
+    partner = symmetry.partners(positions)
+    taken = (positions[:, 0] * side < 0) & (partner >= 0)
+    return np.where(taken, weights[partner], weights)
 
 
 def counts(weights: Values) -> tuple[int, int, int]:

@@ -1,9 +1,17 @@
 """What a sculpt cannot be turned into weights on, and why."""
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from . import armature as scene_armature
+from . import vertex_groups
 from .error import SceneError
+
+# These leave every vertex where it is.
+_KEEPS_SHAPE = {"WEIGHTED_NORMAL", "NORMAL_EDIT", "UV_PROJECT", "UV_WARP"}
+_CHANGES_WEIGHTS = {"VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "DATA_TRANSFER"}
+_NEARLY = 1e-3
 
 
 def check(obj: bpy.types.Object) -> bpy.types.Object:
@@ -12,11 +20,38 @@ def check(obj: bpy.types.Object) -> bpy.types.Object:
         raise SceneError(f"{obj.name} is no mesh with vertices: make the skinned mesh the active object")
     check_editable(obj)
     _check_sculpt_mode(obj)
-    modifier = _armature_modifier(obj)
-    _check_modifier(obj, modifier)
-    _check_bones(obj, modifier.object)
+    rig = _armature(obj)
+    for modifier in _acting(obj):
+        _check_modifier(obj, modifier)
+    _check_before(obj)
+    _check_bones(obj, rig)
     _check_shape_keys(obj)
-    return modifier.object
+    if not ruled(obj).any():
+        raise SceneError(
+            f"No vertex of {obj.name} is moved by exactly one Armature modifier in full: nothing to sculpt"
+        )
+    return rig
+
+
+def ruled(obj: bpy.types.Object) -> NDArray[np.bool_]:
+    """(V,) the vertices that exactly one Armature modifier moves, in full; others do not follow weights alone."""
+    acting = _acting(obj)
+    if len(acting) < 2 and not any(modifier.vertex_group for modifier in acting):
+        return np.ones(len(obj.data.vertices), bool)
+    influence = np.array([_influence(obj, modifier) for modifier in acting])
+    return ((influence > 1 - _NEARLY).sum(axis=0) == 1) & ((influence > _NEARLY).sum(axis=0) == 1)
+
+
+def _influence(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> NDArray[np.float32]:
+    """(V,) how far a modifier acts; a group that the object lacks limits nothing."""
+    if modifier.vertex_group not in obj.vertex_groups:
+        return np.ones(len(obj.data.vertices), np.float32)
+    weights = vertex_groups.values(obj, modifier.vertex_group)
+    return 1 - weights if modifier.invert_vertex_group else weights
+
+
+def _acting(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
+    return [modifier for modifier in scene_armature.modifiers(obj) if modifier.show_viewport]
 
 
 def check_editable(obj: bpy.types.Object) -> None:
@@ -40,37 +75,50 @@ def _check_sculpt_mode(obj: bpy.types.Object) -> None:
         )
 
 
-def _armature_modifier(obj: bpy.types.Object) -> bpy.types.ArmatureModifier:
-    found = [m for m in obj.modifiers if m.type == "ARMATURE" and m.object]
-    if not found:
-        raise SceneError(f"{obj.name} has no Armature modifier, so no weights to sculpt: give it one")
-    shown = [m for m in found if m.show_viewport]
-    if not shown:
+def _armature(obj: bpy.types.Object) -> bpy.types.Object:
+    """By modifiers, or by armature parenting."""
+    found, acting = scene_armature.modifiers(obj), _acting(obj)
+    if found and not acting:
         raise SceneError(f"The Armature modifier {found[0].name} of {obj.name} is hidden: show it in the viewport")
-    if len(shown) > 1:
-        raise SceneError(f"{obj.name} is deformed by {len(shown)} Armature modifiers: hide all but one")
-    return shown[0]
+    rigs = {modifier.object for modifier in acting}
+    if len(rigs) > 1:
+        names = " and ".join(sorted(rig.name for rig in rigs))
+        raise SceneError(f"{obj.name} is deformed by {names} at once: hide all Armature modifiers but those of one")
+    rig = scene_armature.find(obj)
+    if rig is None:
+        raise SceneError(f"{obj.name} has no Armature modifier, so no weights to sculpt: give it one")
+    return rig
 
 
 def _check_modifier(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> None:
     name = f"The Armature modifier {modifier.name} of {obj.name}"
-    if modifier.use_deform_preserve_volume:
-        raise SceneError(
-            f"{name} preserves volume: it turns vertices about bones instead of mixing positions, so weights "
-            "that reach a sculpt cannot be computed exactly; turn Preserve Volume off"
-        )
     if not modifier.use_vertex_groups or modifier.use_bone_envelopes:
         raise SceneError(f"{name} binds by bone envelopes, which weights do not rule: bind to Vertex Groups alone")
-    if modifier.vertex_group:
-        raise SceneError(f"{name} acts through the group {modifier.vertex_group} only: clear it for the time being")
+    if modifier.use_multi_modifier:
+        raise SceneError(f"{name} is mixed with the one before it: turn Multi Modifier off")
+
+
+def _check_before(obj: bpy.types.Object) -> None:
+    """What stands before the first Armature modifier; a Mirror is hidden for the time (switched.py)."""
     for other in obj.modifiers:
-        if other == modifier:
+        if other.type == "ARMATURE":
             return
-        if other.show_viewport:
+        if not other.show_viewport or other.type in _KEEPS_SHAPE or other.type == "MIRROR":
+            continue
+        if other.type not in _CHANGES_WEIGHTS:
             raise SceneError(
                 f"The modifier {other.name} of {obj.name} changes the shape before the armature moves it: "
                 "apply it, hide it or move it below the Armature modifier"
             )
+        if other.type != "DATA_TRANSFER" or _transfers_groups(other):
+            raise SceneError(
+                f"The modifier {other.name} of {obj.name} changes the weights before the armature uses them: "
+                "apply it or hide it"
+            )
+
+
+def _transfers_groups(modifier: bpy.types.DataTransferModifier) -> bool:
+    return modifier.use_vert_data and "VGROUP_WEIGHTS" in modifier.data_types_verts
 
 
 def _check_bones(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
@@ -79,8 +127,6 @@ def _check_bones(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
     if not groups:
         raise SceneError(f"{obj.name} has no vertex group of a deform bone of {armature.name}: bind it first")
     for bone in (armature.data.bones[name] for name in groups):
-        if bone.bbone_segments > 1:
-            raise SceneError(f"Bone {bone.name} of {armature.name} bends: set its Bendy Bones Segments to 1")
         if bone.use_envelope_multiply:
             raise SceneError(
                 f"Bone {bone.name} of {armature.name} multiplies weights by its envelope: turn Envelope Multiply off"
@@ -93,11 +139,3 @@ def _check_shape_keys(obj: bpy.types.Object) -> None:
         return
     if not keys.use_relative:
         raise SceneError(f"{obj.name} has absolute shape keys: make them relative")
-    if obj.active_shape_key != keys.reference_key:
-        raise SceneError(
-            f"The shape key {obj.active_shape_key.name} of {obj.name} is active, so a sculpt would go into it: "
-            f"make {keys.reference_key.name} the active one"
-        )
-    mixed = [key.name for key in keys.key_blocks[1:] if not key.mute and key.value != 0]
-    if mixed:
-        raise SceneError(f"The shape key {mixed[0]} of {obj.name} changes its shape at rest: set it to 0 or mute it")

@@ -1,35 +1,42 @@
-"""Which vertex is opposite to which, across the middle of a character."""
+"""Which vertex mirrors which, across the plane x = 0 of a mesh."""
 
+import bpy
 import numpy as np
-from mathutils import Matrix
 from mathutils.kdtree import KDTree
 from numpy.typing import NDArray
 
-from .mesh import transformed
-
-# Of the diagonal.
+# Of the mesh's diagonal.
 _TOLERANCE = 1e-4
 
 
-def opposite_vertices(positions: NDArray[np.float32], plane: Matrix) -> NDArray[np.int64]:
-    """(V,) the vertex at the mirrored place, -1 where there is none; `plane` takes the YZ plane to the mirror.
+def partners(positions: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(V,) the vertex at the mirrored place, itself on the plane, -1 if there is none within 1e-4 of the diagonal.
 
-    Vertices at one place count as one, so that being opposite goes both ways.
+    Partners are mutual: where several vertices lie at one place, the k-th of one side belongs to the k-th of the other.
     """
-    world = np.array(plane)
-    mirrored = transformed(positions, world @ np.diag([-1.0, 1, 1, 1]) @ np.linalg.inv(world))
-    _, first, same = np.unique(positions, axis=0, return_index=True, return_inverse=True)
-    tree = KDTree(len(first))
-    for vertex in first.tolist():
-        tree.insert(positions[vertex].tolist(), vertex)
+    n = len(positions)
+    found = np.full(n, -1, np.int64)
+    if n == 0:
+        return found
+    tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(positions, axis=0)))
+    tree = KDTree(n)
+    for i, position in enumerate(positions.tolist()):
+        tree.insert(position, i)
     tree.balance()
-    size = float(np.linalg.norm(np.ptp(positions, axis=0)))
-    opposite = np.full(len(positions), -1, np.int64)
-    for vertex in first.tolist():
-        _, other, distance = tree.find(mirrored[vertex].tolist())
-        if other is not None and distance <= _TOLERANCE * size:
-            opposite[vertex] = other
-    paired = first[(opposite[first] >= 0) & (opposite[opposite[first]] == first)]
-    found = np.full(len(positions), -1, np.int64)
-    found[paired] = opposite[paired]
-    return found[first[same.reshape(-1)]]
+    on_plane = np.abs(positions[:, 0]) <= tolerance
+    found[on_plane] = np.flatnonzero(on_plane)
+    for i in np.flatnonzero(positions[:, 0] > tolerance).tolist():
+        x, y, z = positions[i].tolist()
+        there = sorted(index for _, index, _ in tree.find_range((-x, y, z), tolerance))
+        here = sorted(index for _, index, _ in tree.find_range((x, y, z), tolerance))
+        rank = here.index(i)
+        if rank < len(there):
+            found[i], found[there[rank]] = there[rank], i
+    return found
+
+
+def flipped(names: list[str]) -> NDArray[np.int64] | None:
+    """(J,) the name of the other side of each, itself for one in the middle; None if a side is incomplete."""
+    index = {name: j for j, name in enumerate(names)}
+    pairs = [index.get(bpy.utils.flip_name(name), -1) for name in names]
+    return None if -1 in pairs else np.array(pairs, np.int64)

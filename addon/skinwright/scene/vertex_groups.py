@@ -36,6 +36,14 @@ def activate(obj: bpy.types.Object, name: str) -> None:
         obj.vertex_groups.active = obj.vertex_groups[name]
 
 
+def remove(obj: bpy.types.Object, names: Sequence[str]) -> None:
+    """Remove the groups of these names; the active one stays active."""
+    active = obj.vertex_groups.active.name if obj.vertex_groups.active else ""
+    for group in [obj.vertex_groups[name] for name in names if name in obj.vertex_groups]:
+        obj.vertex_groups.remove(group)
+    activate(obj, active)
+
+
 def locked(obj: bpy.types.Object) -> set[str]:
     """Names of the groups the artist has locked."""
     return {group.name for group in obj.vertex_groups if group.lock_weight}
@@ -68,6 +76,14 @@ def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], na
     order = np.argsort(vertex * len(names) + column, kind="stable")
     indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
+
+
+def values(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
+    """(V,) the weights of one group, 0 where a vertex is no member."""
+    rows = read(obj, [name])
+    weights = np.zeros(len(rows.indptr) - 1, np.float32)
+    weights[np.diff(rows.indptr).astype(bool)] = rows.values
+    return weights
 
 
 def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDArray[np.integer] | None = None) -> None:

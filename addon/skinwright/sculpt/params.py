@@ -22,7 +22,7 @@ class SculptParams(Params):
     kappa: float = setting(
         0.01,
         "Stiffness",
-        "How much weights hold on to what they were: low follows the sculpt, high hardly moves",
+        "How much weights hold on to what they were: low follows the sculpt closely, high changes them little",
         least=1e-6,
         most=1,
         soft_least=0.001,
@@ -64,6 +64,11 @@ class SculptParams(Params):
             "DISCARD": ("Discard", "It is lost"),
             "SHAPE_KEY": ("Shape Key", "It goes to a corrective shape key that the joint's turn drives"),
         },
+    )
+    mirror: bool = setting(
+        False,
+        "Mirror X",
+        "Sculpt the other side of the mesh alike, in the mirrored pose, whatever its own pose is now",
     )
     threads: int = threads()
 

@@ -5,6 +5,7 @@ from bpy.props import PointerProperty
 from bpy.types import Object, PropertyGroup, Scene
 
 from .overlay import SKINWRIGHT_PG_overlay
+from .refine import SKINWRIGHT_PG_refine
 from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
@@ -19,6 +20,7 @@ class SKINWRIGHT_PG_scene(PropertyGroup):
     transfer: PointerProperty(type=SKINWRIGHT_PG_transfer)
     overlay: PointerProperty(type=SKINWRIGHT_PG_overlay)
     sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
+    refine: PointerProperty(type=SKINWRIGHT_PG_refine)
     retarget: PointerProperty(type=SKINWRIGHT_PG_retarget)
 
 

@@ -19,12 +19,12 @@ class SKINWRIGHT_PG_sculpt(PropertyGroup):
         CANDIDATES
         | {
             "add_candidates": BoolProperty(
-                name="Desparsify First",
-                description="Give every vertex its bones to choose from when sculpting begins",
+                name="Offer More Bones",
+                description="Let vertices take up near bones that they do not follow yet",
                 default=True,
             )
         }
-        | properties(SculptParams, ["kappa", "guard", "guard_alpha", "residual"])
+        | properties(SculptParams, ["kappa", "guard", "guard_alpha", "residual", "mirror"])
     )
     if TYPE_CHECKING:
 
@@ -42,6 +42,7 @@ class SKINWRIGHT_PG_sculpt(PropertyGroup):
         if self.guard != "NONE":
             layout.prop(self, "guard_alpha", slider=True)
         layout.prop(self, "residual")
+        layout.prop(self, "mirror")
 
     def to_options(self, threads: int = 0) -> SculptParams:
         """As plain values. Raises SettingError for a value outside its range."""

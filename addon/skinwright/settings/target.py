@@ -27,6 +27,12 @@ class SKINWRIGHT_PG_object(PropertyGroup):
             default=False,
             options={"HIDDEN"},
         ),
+        "painting": BoolProperty(
+            name="Painting",
+            description="The match mask is being painted; undo has gone back to before that where this is off",
+            default=False,
+            options={"HIDDEN"},
+        ),
     }
     if TYPE_CHECKING:
 

@@ -34,6 +34,7 @@ class TransferSettings:
         layout.prop(self, "source_scope")
         layout.prop(self, "geometry")
         layout.prop(self, "join_borders")
+        layout.prop(self, "relative_weld_tolerance")
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
         layout.prop(self, "max_normal_angle")
         layout.prop(self, "match_flipped_normals")
@@ -82,5 +83,6 @@ class SKINWRIGHT_PG_transfer(TransferSettings, PropertyGroup):
         name="Source",
         description="The body whose weights are transferred to the selected meshes",
         type=Object,
-        poll=lambda _settings, obj: obj.type == "MESH",
+        # Shapes of bones are meshes too, and have no weights.
+        poll=lambda _settings, obj: obj.type == "MESH" and bool(obj.vertex_groups),
     )

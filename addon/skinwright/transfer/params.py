@@ -65,15 +65,16 @@ class TransferParams(Params):
         "AS_SHOWN",
         "Geometry",
         "Which shapes are laid over each other",
+        # Files keep the number of a choice: new ones come last.
         choices={
-            "AS_SHOWN": (
-                "As Shown, in Rest Pose",
-                "The shapes with shape keys and modifiers, but not as they are posed",
-            ),
             "REST": ("Rest", "The shapes without modifiers, shape keys or pose"),
             "CURRENT": (
                 "Current",
                 "The shapes as they are posed and deformed now; what does not follow the pose yet is bound in it",
+            ),
+            "AS_SHOWN": (
+                "As Shown, in Rest Pose",
+                "The shapes with shape keys and modifiers, but not as they are posed",
             ),
         },
     )
@@ -90,7 +91,7 @@ class TransferParams(Params):
     relative_max_distance: float = setting(
         0.05,
         "Distance",
-        "Farthest from the source a vertex may match, as a part of the target's bounding-box diagonal",
+        "Farthest from the source a vertex may match, as a part of the target's diagonal or of 30 % of the source's",
         most=10,
         soft_most=0.5,
         precision=3,
@@ -110,6 +111,16 @@ class TransferParams(Params):
     )
     join_borders: bool = setting(
         True, "Join Borders", "Solve targets whose borders lie on each other as one mesh, so that no gap opens there"
+    )
+    relative_weld_tolerance: float = setting(
+        1e-6,
+        "Weld",
+        "Vertices closer than this part of the target's diagonal are one, as at seams of imported files; 0 for none",
+        most=0.1,
+        soft_most=1e-3,
+        precision=6,
+        step=0.01,
+        native=True,
     )
     mask: Mask | None = setting(None, "Mask", "A vertex group that steers the match, for every target the same")
     smoothness_length: float | None = setting(

@@ -72,8 +72,12 @@ def united(geometries: Sequence[Geometry]) -> Geometry:
     if len(geometries) == 1:
         return geometries[0]
     starts = np.cumsum([0, *(len(geometry.positions) for geometry in geometries)], dtype=np.int64)
-    triangles = [g.triangles + np.uint32(start) for g, start in zip(geometries, starts, strict=False)]
-    return Geometry(np.concatenate([g.positions for g in geometries]), np.concatenate(triangles))
+    placed = list(zip(geometries, starts, strict=False))
+    return Geometry(
+        np.concatenate([geometry.positions for geometry in geometries]),
+        np.concatenate([geometry.triangles + np.uint32(start) for geometry, start in placed]),
+        np.concatenate([geometry.wires + np.uint32(start) for geometry, start in placed]),
+    )
 
 
 def united_rows(rows: Sequence[Rows]) -> Rows:

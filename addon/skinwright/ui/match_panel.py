@@ -1,12 +1,20 @@
 """The panel of the match: see it, select by it, paint it; and the overlays."""
 
 import bpy
-from bpy.types import Context, Panel, UILayout
+from bpy.types import Context, Panel
 
 from ..check import shown
-from ..match.painting import BRUSH_WEIGHTS, brush_value
 from ..match.session import current_of
 from .panel import Tab
+from .result_panel import paragraph
+
+ROWS_OF_ACTIONS = (
+    (("From Match", "FROM_MATCH"), ("Clear", "CLEAR")),
+    (("Grow", "GROW"), ("Shrink", "SHRINK")),
+    (("Invert", "INVERT"),),
+    (("Mirror +X", "MIRROR_POSITIVE"), ("Mirror -X", "MIRROR_NEGATIVE")),
+)
+OVERLAYS = (("NONE", "None"), ("MATCH", "Match"), ("INFLUENCES", "Bone Count"), ("STRETCH", "Stretch"))
 
 
 class SKINWRIGHT_PT_match(Tab, Panel):
@@ -21,27 +29,13 @@ class SKINWRIGHT_PT_match(Tab, Panel):
         overlay = context.scene.skinwright.overlay
         shown = overlay.kind == "MATCH" and current_of(context.object)
         layout.operator("skinwright.preview_match", icon="HIDE_OFF", depress=bool(shown))
-        if bpy.ops.skinwright.end_match_mask.poll():
-            _draw_painting(layout, context)
-        else:
+        if not bpy.ops.skinwright.end_match_mask.poll():
             layout.operator("skinwright.paint_match_mask", icon="BRUSH_DATA")
-        row = layout.row(align=True)
-        row.label(text="Select")
-        row.operator("skinwright.select_match", text="Unmatched").what = "UNMATCHED"
-        row.operator("skinwright.select_match", text="Loose").what = "LOOSE"
-        row.operator("skinwright.select_match", text="Island").what = "ISLAND"
-
-
-def _draw_painting(layout: UILayout, context: Context) -> None:
-    row = layout.row(align=True)
-    row.operator("skinwright.end_match_mask", text="Keep", icon="CHECKMARK").keep = True
-    row.operator("skinwright.end_match_mask", text="Cancel", icon="X").keep = False
-    row = layout.row(align=True)
-    painted = brush_value(context)
-    for value in BRUSH_WEIGHTS:
-        button = row.operator("skinwright.mask_brush", text=value.title(), depress=painted == value)
-        button.value = value
-    layout.prop(context.scene.skinwright.overlay, "live")
+        layout.operator("skinwright.explain_vertex", icon="QUESTION")
+        column = layout.column(align=True)
+        column.operator("skinwright.select_match", text="Select Unmatched").what = "UNMATCHED"
+        column.operator("skinwright.select_match", text="Select Loose Parts").what = "LOOSE"
+        column.operator("skinwright.select_match", text="Select Whole Parts").what = "ISLAND"
 
 
 class SKINWRIGHT_PT_match_edit(Tab, Panel):
@@ -54,15 +48,14 @@ class SKINWRIGHT_PT_match_edit(Tab, Panel):
     def draw(self, _context: Context) -> None:
         """Each button is one action."""
         layout = self.layout
-        for actions in (("FROM_MATCH", "CLEAR"), ("GROW", "SHRINK"), ("INVERT",)):
+        for actions in ROWS_OF_ACTIONS:
             row = layout.row(align=True)
-            for action in actions:
-                text = action.replace("_", " ").title()
+            for text, action in actions:
                 row.operator("skinwright.edit_match_mask", text=text).action = action
-        row = layout.row(align=True)
-        row.label(text="Selected")
-        for text, value in (("Inpaint", "INPAINT"), ("Automatic", "AUTOMATIC"), ("Match", "MATCH")):
-            button = row.operator("skinwright.edit_match_mask", text=text)
+        column = layout.column(align=True)
+        column.label(text="Selected Vertices")
+        for text, value in (("Inpaint", "INPAINT"), ("Automatic", "AUTOMATIC"), ("Force Match", "MATCH")):
+            button = column.operator("skinwright.edit_match_mask", text=text)
             button.action, button.value = "FROM_SELECTION", value
         layout.operator("skinwright.store_match")
 
@@ -78,7 +71,11 @@ class SKINWRIGHT_PT_overlay(Tab, Panel):
         """Kind and opacity."""
         layout = self.layout
         overlay = context.scene.skinwright.overlay
-        layout.row().prop(overlay, "kind", expand=True)
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for kind, text in OVERLAYS:
+            grid.operator("skinwright.show_overlay", text=text, depress=overlay.kind == kind).kind = kind
+        if overlay.kind == "MATCH" and current_of(context.object) is None:
+            paragraph(layout, context, "The active mesh has no match prepared: press Match", "ERROR")
         layout.prop(overlay, "opacity", slider=True)
 
 

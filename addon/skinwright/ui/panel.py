@@ -50,11 +50,14 @@ class SKINWRIGHT_PT_transfer(Tab, Panel):
             row.alert = True
             row.label(text="The native module cannot be used", icon="ERROR")  # the button's tooltip says why
         settings = context.scene.skinwright.transfer
-        layout.prop(settings, "source")
+        row = layout.row(align=True)
+        row.prop(settings, "source")
+        row.operator("skinwright.active_as_source", text="", icon="RESTRICT_SELECT_OFF")
         layout.prop(settings, "groups")
         if jobs.running:
             layout.progress(factor=jobs.running.progress, text=f"{jobs.running.progress:.0%}, Esc stops")
         layout.operator("skinwright.transfer_weights", icon="MOD_VERTEX_WEIGHT")
+        layout.operator("skinwright.automatic_weights", icon="BONE_DATA")
 
 
 class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):

@@ -16,9 +16,16 @@ class SKINWRIGHT_UL_bone_map(UIList):
     """The bones of the target; those without a sure partner are marked."""
 
     def draw_item(
-        self, context: Context, layout: UILayout, _settings: Any, entry: Any, _icon: int, *_more: Any
+        self,
+        context: Context,
+        layout: UILayout,
+        _settings: Any,
+        entry: Any,
+        _icon: int,
+        _active: Any,
+        *_more: Any,
     ) -> None:
-        """Bone, partner, confidence."""
+        """Bone, partner, confidence. Blender counts the named arguments: at least seven."""
         sure = entry.source and (entry.source != entry.found or entry.confidence >= UNSURE)
         row = layout.row(align=True)
         row.label(text=entry.name, icon="BONE_DATA" if sure else "ERROR")

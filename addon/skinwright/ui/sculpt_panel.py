@@ -1,10 +1,9 @@
 """The panel of sculpting weights: begin, what is going on, settings."""
 
 import bpy
-from bpy.types import Context, Panel, UILayout
+from bpy.types import Context, Panel
 
 from ..sculpt import session as sculpt_session
-from ..sculpt.session import SculptSession
 from .panel import Tab
 
 
@@ -18,26 +17,16 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
         """While sculpting, the ways to end it."""
         layout = self.layout
         settings = context.scene.skinwright.sculpt
-        if sculpt_session.current:
-            _draw_state(layout, sculpt_session.current)
-        else:
+        if sculpt_session.current is None:
             layout.operator("skinwright.sculpt_weights", icon="SCULPTMODE_HLT")
             layout.operator("skinwright.desparsify", icon="GROUP_VERTEX")
         layout.prop(settings, "kappa", slider=True)
-        overlay = context.scene.skinwright.overlay
-        shown = overlay.kind == "INFLUENCES"
-        button = layout.operator("wm.context_set_enum", text="Show Influence Counts", icon="OVERLAY", depress=shown)
-        button.data_path, button.value = "scene.skinwright.overlay.kind", "NONE" if shown else "INFLUENCES"
-
-
-def _draw_state(layout: UILayout, session: SculptSession) -> None:
-    row = layout.row(align=True)
-    row.operator("skinwright.end_sculpt_weights", text="Keep", icon="CHECKMARK").keep = True
-    row.operator("skinwright.end_sculpt_weights", text="Cancel", icon="X").keep = False
-    column = layout.column(align=True)
-    column.label(text=f"{session.target_name}: {session.stroke_count} strokes, {session.pose_count} poses")
-    if session.reachability is not None:
-        column.progress(factor=max(session.reachability, 0), text=f"{session.reachability:.0%} reached")
+        row = layout.row(align=True)
+        row.operator("skinwright.step_pose", text="Pose", icon="TRIA_LEFT").step = -1
+        row.operator("skinwright.step_pose", text="Pose", icon="TRIA_RIGHT").step = 1
+        shown = context.scene.skinwright.overlay.kind == "INFLUENCES"
+        button = layout.operator("skinwright.show_overlay", text="Show Bone Counts", icon="OVERLAY", depress=shown)
+        button.kind = "NONE" if shown else "INFLUENCES"
 
 
 class SKINWRIGHT_PT_sculpt_settings(Tab, Panel):

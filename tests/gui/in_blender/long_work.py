@@ -36,6 +36,25 @@ def steps(window: Window) -> Steps:
     yield from until(lambda: jobs.running is None)
     assert runner.result is None and not garment.vertex_groups, "Esc came too late or something was written"
 
+    # A script deletes the target meanwhile: a sentence, and nothing goes on.
+    copy = garment.copy()
+    copy.data = garment.data.copy()
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    for other in (copy, garment):
+        other.select_set(other == copy)
+    bpy.context.view_layer.objects.active = copy
+    with window.context():
+        assert bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    bpy.data.objects.remove(copy)
+    yield from until(lambda: jobs.running is None, 60)
+    last = import_module(f"{EXTENSION}.reporting").last
+    assert last.failed and "an object was deleted while it worked" in last.sentence, last
+    window.key("ESC")  # the error's popup
+    yield 0.3
+    garment.select_set(True)
+    bpy.context.view_layer.objects.active = garment
+
     with window.context():
         bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT", True)
     seen = []

@@ -26,7 +26,8 @@ def press(window: Window, value: str) -> None:
 
 
 def painting():
-    return import_module(f"{EXTENSION}.operators.match.paint_mask").SKINWRIGHT_OT_paint_match_mask.painting
+    """The session's feature part, None while none runs."""
+    return getattr(import_module(f"{EXTENSION}.operators.modal.brush_session").current, "painting", None)
 
 
 def look(window: Window) -> None:

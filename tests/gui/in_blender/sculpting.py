@@ -40,9 +40,9 @@ def session():
     return import_module(f"{EXTENSION}.sculpt.session").current
 
 
-def positions() -> np.ndarray:
+def positions(name: str = "Body") -> np.ndarray:
     """(V, 3) of the mesh at rest, by the public API."""
-    return np.array([vertex.co for vertex in bpy.data.objects["Body"].data.vertices], np.float32)
+    return np.array([vertex.co for vertex in bpy.data.objects[name].data.vertices], np.float32)
 
 
 def brush(window: Window, size: int) -> None:

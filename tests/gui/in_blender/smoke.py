@@ -20,8 +20,8 @@ def left_behind() -> dict[str, list[str]]:
         "timers and drawings": [
             module
             for module, running in (
-                (f"{EXTENSION}.operators.timers", "_running"),
-                (f"{EXTENSION}.ui.overlay", "_handles"),
+                (f"{EXTENSION}.operators.modal.timers", "_running"),
+                (f"{EXTENSION}.overlay.draw", "_handles"),
             )
             if getattr(sys.modules.get(module), running, None)
         ],

@@ -1,5 +1,5 @@
 """Preview Match, and the mask that steers it."""
 
-from . import brush_weight, edit_mask, paint_mask, preview
+from . import brush_weight, edit_mask, paint_mask, preview, why
 
-MODULES = (preview, edit_mask, brush_weight, paint_mask)
+MODULES = (preview, edit_mask, brush_weight, paint_mask, why)

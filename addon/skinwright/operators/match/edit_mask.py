@@ -30,6 +30,8 @@ class SKINWRIGHT_OT_edit_match_mask(SkinwrightOperator):
             ("GROW", "Grow", "Inpaint one ring of vertices more"),
             ("SHRINK", "Shrink", "Inpaint one ring of vertices less; they match automatically"),
             ("INVERT", "Invert", "Swap inpaint and force match"),
+            ("MIRROR_POSITIVE", "Mirror +X to -X", "Copy the mask from the side of positive X to the other"),
+            ("MIRROR_NEGATIVE", "Mirror -X to +X", "Copy the mask from the side of negative X to the other"),
             ("FROM_SELECTION", "From Selection", "Set the value for the selected vertices"),
         ],
     )
@@ -67,6 +69,9 @@ class SKINWRIGHT_OT_edit_match_mask(SkinwrightOperator):
             return mask.with_value(values, mesh.selected(obj), value)
         if self.action in ("GROW", "SHRINK"):
             return (mask.grow if self.action == "GROW" else mask.shrink)(values, mesh.edges(obj))
+        if self.action.startswith("MIRROR"):
+            side = 1 if self.action == "MIRROR_POSITIVE" else -1
+            return mask.mirrored(values, mesh.rest_positions(obj.data), side)
         return 1 - values if self.action == "INVERT" else mask.cleared(values)
 
     def _matched(self, context: Context) -> NDArray[np.bool_]:

@@ -12,6 +12,7 @@ from ...scene import attributes, mesh
 from ...scene.error import SceneError
 from ...transfer.params import TransferParams
 from ..base import SkinwrightOperator
+from ..modal import brush_session
 
 
 def target(context: Context) -> Object:
@@ -63,8 +64,7 @@ class _OnMatch(SkinwrightOperator):
         session = match_session.current_of(obj) or begin(context)
         params = context.scene.skinwright.transfer.to_params()
         session.read_mask(obj)
-        self.report({"INFO"}, self.on_match(obj, session, params))
-        return {"FINISHED"}
+        return self.tell(self.on_match(obj, session, params), [])
 
 
 class SKINWRIGHT_OT_preview_match(_OnMatch):
@@ -118,8 +118,14 @@ class SKINWRIGHT_OT_select_match(_OnMatch):
         return refusal(context) or (f"{obj.name} is hidden: show it to select in it" if obj and hidden else "")
 
     def on_match(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
-        """Go to Edit mode with the vertices selected."""
+        """Go to Edit mode with the vertices selected; while the mask is painted, show them under the brush."""
         chosen = session.chosen(self.what, session.match(params), mesh.selected(obj))
+        if brush_session.current and brush_session.current.target() == obj:
+            mesh.select(obj, chosen)
+            obj.data.use_paint_mask_vertex = True
+            return (
+                f"{int(chosen.sum())} vertices of {obj.name} selected: the brush acts on them alone until V is pressed"
+            )
         if obj.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         mesh.select(obj, chosen)

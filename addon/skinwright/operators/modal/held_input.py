@@ -1,6 +1,9 @@
-"""Whether a brush is down: no operator sees the release that ends a stroke, but all see which operators are running."""
+"""Whose the input is: no operator sees the release that ends a stroke, but all see which operators are running."""
 
-from bpy.types import Context, Operator
+import bpy
+from bpy.types import Context, Event, Operator
+
+_JOBS = ("RENDER", "OBJECT_BAKE")
 
 
 def by_another(context: Context, operator: type[Operator]) -> bool:
@@ -8,3 +11,16 @@ def by_another(context: Context, operator: type[Operator]) -> bool:
     windows = context.window_manager.windows
     names = {running.bl_idname for window in windows for running in window.modal_operators}
     return bool(names - {operator.__name__})
+
+
+def is_elsewhere(context: Context, event: Event) -> bool:
+    """Whether a key is meant for something else: playback or a job, which Esc stops, or another editor."""
+    if any(window.screen.is_animation_playing for window in context.window_manager.windows):
+        return True
+    if any(bpy.app.is_job_running(job) for job in _JOBS):
+        return True
+    return not any(_contains(area, event) for area in context.screen.areas if area.type == "VIEW_3D")
+
+
+def _contains(area: bpy.types.Area, event: Event) -> bool:
+    return 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height

@@ -4,8 +4,8 @@ from typing import Any
 
 from bpy.types import Context, Event, Operator
 
-from ... import jobs, native
-from ...scene.error import SceneError
+from ... import jobs, reporting
+from ...errors import Refused, internal
 from . import timers
 
 TICK_SECONDS = 0.05
@@ -22,9 +22,8 @@ class LongWork(Operator):
         """Start; what is done by then is completed at once."""
         try:
             runner = jobs.Runner(steps)
-        except (SceneError, native.NativeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        except Refused as error:
+            return self._failed(error)
         if runner.done:
             return self.complete(context, runner.result)
         self._runner = jobs.running = runner
@@ -44,19 +43,23 @@ class LongWork(Operator):
             return {"RUNNING_MODAL"}
         try:
             runner.poll()
-        except (SceneError, native.NativeError) as error:
+            _show(context)
+            if not runner.done:
+                return {"RUNNING_MODAL"}
             self._end(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except BaseException:
-            # Else the timer would come back to it for ever.
+            return self.complete(context, runner.result)
+        except BaseException as error:
+            # Also a panic of the native module. Else the timer would come back to it for ever.
             self._end(context)
-            raise
-        _show(context)
-        if not runner.done:
-            return {"RUNNING_MODAL"}
-        self._end(context)
-        return self.complete(context, runner.result)
+            return self._failed(error)
+
+    def _failed(self, error: BaseException) -> set[str]:
+        sentence = str(error) if isinstance(error, Refused) else f"{self.bl_label}: {internal(error)}"
+        if isinstance(error, ReferenceError):
+            sentence = f"{self.bl_label}: an object was deleted while it worked, so nothing was written"
+        reporting.remember(self.bl_label, sentence, failed=True)
+        self.report({"ERROR"}, sentence)
+        return {"CANCELLED"}
 
     def cancel(self, context: Context) -> None:
         """Also called by Blender, when it loads a file or quits."""
@@ -72,7 +75,8 @@ class LongWork(Operator):
 def _show(context: Context) -> None:
     runner = jobs.running
     text = f"Skinwright: {runner.progress:.0%}   Esc: stop, nothing is written" if runner else None
-    context.workspace.status_text_set(text)
-    for area in context.screen.areas:
+    if context.workspace:
+        context.workspace.status_text_set(text)
+    for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":
             area.tag_redraw()

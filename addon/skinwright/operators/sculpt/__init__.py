@@ -1,5 +1,5 @@
 """Sculpt Weights: the modal operator and what it watches."""
 
-from . import keys, weights
+from . import keys, step_pose, weights
 
-MODULES = (keys, weights)
+MODULES = (keys, step_pose, weights)

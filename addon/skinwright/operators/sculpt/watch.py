@@ -11,7 +11,6 @@ class StrokeWatch:
         """Nothing has changed yet."""
         self._session = session
         self._seen: int | None = changes.version
-        self._undone = changes.undone
         self._expected: int | None = None
 
     def expect_stroke(self) -> None:
@@ -29,9 +28,5 @@ class StrokeWatch:
         if self._seen == changes.version:
             return None
         self._seen = changes.version
-        if self._undone != changes.undone:
-            # Blender's own undo, from its menu: the weights it has brought back are not the session's.
-            self._undone = changes.undone
-            self._session.assert_state()
         self._session.set_strength(kappa)
         return self._session.stroke()

@@ -1,13 +1,14 @@
 //! One independent block of unknowns: assembled, factored, solved for any number of columns.
 
 use rayon::prelude::*;
-use skinwright_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
+use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SymmetricMatrix};
 
 use super::constraint::Known;
 use super::rows::{KnownRows, Row};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
+use crate::progress::Progress;
 
 /// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;
@@ -23,6 +24,16 @@ pub struct System {
 }
 
 impl System {
+    /// The block's vertices, ascending.
+    pub(super) fn unknowns(&self) -> &[u32] {
+        &self.unknowns
+    }
+
+    /// Takes the block for that of another `length`, because its own cannot be solved.
+    pub(super) fn standing_for(self, length: f64) -> Self {
+        Self { length, ..self }
+    }
+
     /// Assembles the block of `unknowns`; `number` is from [`system::number_unknowns`].
     pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], length: f64) -> Self {
         let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, length);
@@ -91,12 +102,14 @@ impl Block {
     /// Factors an assembled block; `positions` are those of all vertices.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] with a vertex of the block.
-    pub fn new(positions: &[[f32; 3]], system: System) -> Result<Self> {
+    /// [`Error::NotPositiveDefinite`] with a vertex of the block, [`Error::Cancelled`].
+    pub fn new(positions: &[[f32; 3]], system: System, progress: &Progress) -> Result<Self> {
         let System { unknowns, soft, length, matrix, boundary } = system;
         let positions: Vec<_> = unknowns.iter().map(|&i| positions[i as usize].into()).collect();
-        let factor = Cholesky::factor(matrix, &positions)
-            .map_err(|e| Error::NotPositiveDefinite { vertex: unknowns[e.unknown] as usize })?;
+        let factor = Cholesky::factor_until(matrix, &positions, progress.stop()).map_err(|failure| match failure {
+            Failure::NotPositive(failed) => Error::NotPositiveDefinite { vertex: unknowns[failed.unknown] as usize },
+            Failure::Stopped => Error::Cancelled,
+        })?;
         Ok(Self { unknowns, soft, length, boundary, factor })
     }
 

@@ -11,11 +11,12 @@ use super::local::Local;
 
 /// Skin within this many radii of a contact belongs to the membrane. A distance, not a number of edges: rings of a coarse
 /// limb cost it a seventh of its volume.
-const WIDTH: f32 = 0.3;
+const WIDTH: f32 = 0.4;
 /// How far a pass moves the membrane towards the mean of its neighbours.
 const SMOOTHING: f32 = 0.5;
-/// In contact is what has come this near to the plane, in radii.
-const TOUCH: f32 = 4e-4;
+/// In contact is what has come this near to the plane, in radii: the lattice holds skin off the plane, and folds start
+/// before it is there.
+const TOUCH: f32 = 0.2;
 
 /// One bent joint in one step.
 #[derive(Debug, Clone, Copy)]
@@ -30,10 +31,18 @@ pub(super) struct Crease<'a> {
 impl Crease<'_> {
     /// Puts lattice and skin back on their own sides.
     pub(super) fn separate(&self, local: &mut Local) {
-        for member in self.members.iter().filter(|member| member.side != 0.0) {
+        let nodes = local.nodes;
+        for member in self.members {
             let particle = &mut local.particles[member.particle as usize];
-            let by = self_collision(&self.plane, place(particle), member.side);
-            shift(particle, by);
+            if member.side != 0.0 {
+                let by = self_collision(&self.plane, place(particle), member.side);
+                shift(particle, by);
+            } else if member.particle as usize >= nodes {
+                // Skin that lies in the plane at rest stays between the two sides.
+                let height = (place(particle) - self.plane.origin).dot(self.plane.normal);
+                let within = height.clamp(-self.plane.gap / 2.0, self.plane.gap / 2.0);
+                shift(particle, self.plane.normal * (within - height));
+            }
         }
     }
 
@@ -43,7 +52,6 @@ impl Crease<'_> {
         let touches = |m: &&Member| {
             let at = place(&local.particles[m.particle as usize]);
             local.is_surface(m.particle)
-                && m.side != 0.0
                 && self.plane.depth(at, m.side) < within
                 && (at - self.axis.origin).dot(inwards) > 0.0
         };

@@ -31,8 +31,11 @@ impl Length {
 pub struct Settings {
     /// How matching points are found. Default [`MatchMethod::ClosestPoint`].
     pub method: MatchMethod,
-    /// Largest distance of a match; relative to the target's diagonal. Default 0.05 relative.
+    /// Largest distance of a match; relative to the target's diagonal, or to 30 % of the source's if that is larger. Default
+    /// 0.05 relative.
     pub max_distance: Length,
+    /// Vertices no farther apart than this are one; relative to the target's diagonal, 0 for none. Default 1e-6 relative.
+    pub weld_tolerance: Length,
     /// Largest angle between normals of a match, radians. Default 35 degrees.
     pub max_normal_angle: f64,
     /// Whether opposite normals match too. Default true.
@@ -55,6 +58,7 @@ impl Default for Settings {
         Self {
             method: MatchMethod::ClosestPoint,
             max_distance: Length::Relative(0.05),
+            weld_tolerance: Length::Relative(1e-6),
             max_normal_angle: 35f64.to_radians(),
             match_flipped_normals: true,
             smoothness_length: Length::Relative(0.05),
@@ -71,6 +75,7 @@ impl Settings {
     /// [`Error::InvalidParameter`] for the first value out of range.
     pub fn check(&self) -> Result<()> {
         self.max_distance.check("max_distance")?;
+        self.weld_tolerance.check("weld_tolerance")?;
         self.smoothness_length.check("smoothness_length")?;
         let (angle, factor) = (self.max_normal_angle, self.smoothing_factor);
         check_range("max_normal_angle", angle, angle >= 0.0, "must be an angle in radians, 0 or more")?;

@@ -4,10 +4,15 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::normals;
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 use crate::surface::{SurfaceIndex, SurfacePoint};
 use crate::weights::Weights;
+use crate::weld::Weld;
+
+/// Vertices no farther apart than this share of the diagonal are one, as far as normals are concerned.
+const WELD_TOLERANCE: f64 = 1e-6;
 
 /// A weighted mesh with its bounding volume hierarchy and normals. Owns its data; a clone shares it.
 #[derive(Debug, Clone)]
@@ -18,6 +23,7 @@ pub struct Source {
 
 #[derive(Debug)]
 struct Geometry {
+    positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     index: SurfaceIndex,
     normals: Vec<Vec3>,
@@ -39,9 +45,13 @@ impl Source {
     pub fn new(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, weights: Weights) -> Result<Self> {
         let mesh = TriMesh::new(positions, &triangles, "source")?;
         let weights = SourceWeights::new(weights, mesh.vertex_count())?;
-        let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), || mesh.vertex_normals());
         let diagonal = mesh.diagonal();
-        let geometry = Geometry { index, normals, diagonal, triangles };
+        let normals = || {
+            let weld = Weld::coincident(positions, WELD_TOLERANCE * diagonal);
+            normals::of_source(&mesh, weld.as_ref())
+        };
+        let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), normals);
+        let geometry = Geometry { index, normals, diagonal, triangles, positions: positions.to_vec() };
         Ok(Self { geometry: Arc::new(geometry), weights: Arc::new(weights) })
     }
 
@@ -59,7 +69,8 @@ impl Source {
         &self.geometry.triangles
     }
 
-    /// Area-weighted vertex normals, (V, 3).
+    /// Area-weighted vertex normals, (V, 3); vertices that only the file keeps apart have one, unless they lie on opposite
+    /// sides of a sheet.
     pub fn normals(&self) -> &[Vec3] {
         &self.geometry.normals
     }
@@ -99,6 +110,13 @@ impl Source {
             }
         }
         merge_and_normalise(row, start);
+    }
+
+    /// Whether a position lies behind the triangle of a surface point.
+    pub(super) fn is_behind(&self, point: &SurfacePoint, position: [f32; 3]) -> bool {
+        let corners = self.geometry.triangles[point.triangle as usize];
+        let [a, b, c] = corners.map(|i| Vec3::from(self.geometry.positions[i as usize]).as_dvec3());
+        (Vec3::from(position).as_dvec3() - a).dot((b - a).cross(c - a)) < 0.0
     }
 
     /// Whether [`Source::blend`] appends anything at a point.
