@@ -5,9 +5,11 @@ from . import (
     bone_map,
     check_weights,
     desparsify,
+    embed_armature,
     match,
     panel_buttons,
     presets,
+    refine,
     retarget_weights,
     sculpt,
     stored_weights,
@@ -31,4 +33,5 @@ MODULES = (
     panel_buttons,
     retarget_weights,
     bone_map,
+    embed_armature,
 )
