@@ -22,7 +22,7 @@ const NORMAL_SMOOTHING: f64 = 0.02;
 /// The rounds of the optional registration.
 const ROUNDS: Schedule<'static> = Schedule { lengths: &[0.15, 0.1, 0.075, 0.05, 0.035, 0.025, 0.015], trusted: 0.04 };
 /// How far vertices follow the weights of their first match.
-const FOLLOW: f64 = 0.5;
+const FOLLOW: f64 = 0.4;
 
 /// Everything that is known before the first vertex is matched.
 #[derive(Debug)]
@@ -125,7 +125,7 @@ impl<'a> Prepared<'a> {
         Ok(Placed { positions, normals, source_normals, matches })
     }
 
-    /// Moves each vertex halfway to where the weights of its match would carry it: the nearest bones change abruptly between
+    /// Moves each vertex part of the way to where the weights of its match would carry it: the nearest bones change abruptly between
     /// limbs, painted weights do not.
     fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
         let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);
