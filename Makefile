@@ -201,3 +201,7 @@ embed-eval: .venv/bench.stamp $(BODY)
 .PHONY: refine-eval
 refine-eval: .venv/bench.stamp
 	.venv/bin/python bench/refine_eval.py
+## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
+.PHONY: retarget-eval
+retarget-eval: .venv/bench.stamp $(BODY)
+	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out

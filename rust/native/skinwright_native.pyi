@@ -569,14 +569,23 @@ def embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Embedding:
     """Puts the bones of a template into a mesh that has none.
 
     `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int,
     negative for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it
-    is. "medial" needs the shape of the mesh only.
+    is. "medial" needs the shape of the mesh only. "template" needs the character that the bones were made for:
+    `donor_positions` (D, 3), `donor_triangles`, and `donor_weights` over the bones. Its surface is drawn onto the mesh,
+    and each joint goes where it lies relative to its own surface. `mirror` (B,): the bone on the other side, its own
+    index in the middle, negative for none; without it nothing is made symmetric. `landmarks` (L, 2): a vertex of the
+    donor and one of the mesh each.
     """
 
 def start_embed_skeleton(
@@ -586,7 +595,12 @@ def start_embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Job:
     """The same as a job, whose result is an `Embedding`."""

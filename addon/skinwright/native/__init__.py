@@ -132,6 +132,32 @@ class Job:
         return transfer, _rows(transfer.weights)
 
 
+class EmbeddingJob(Job):
+    """An embedding going on."""
+
+    def result(self) -> Any:
+        """skinwright_native.Embedding; waits for it."""
+        with _naming(self._name):
+            return self._job.result()
+
+
+def start_embedding(
+    name: str, mesh: tuple[NDArray, NDArray], bones: tuple[NDArray, NDArray, NDArray], donor: tuple, **options: Any
+) -> EmbeddingJob:
+    """A skeleton into a mesh, on threads of Rust's own; keyword arguments as in the stub.
+
+    `mesh` is positions and triangles, `bones` are heads, tails and parents, `donor` is empty or positions, triangles and
+    rows of the character that the bones were made for.
+    """
+    keywords = dict(options)
+    with _naming(name):
+        if donor:
+            positions, triangles, rows = donor
+            keywords |= {"donor_positions": positions, "donor_triangles": triangles}
+            keywords["donor_weights"] = _module.Weights(*rows, len(bones[0]))
+        return EmbeddingJob(name, _module.start_embed_skeleton(*mesh, *bones, **keywords))
+
+
 def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
     """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
 
