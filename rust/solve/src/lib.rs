@@ -198,8 +198,8 @@ impl Factor {
 
 #[cfg(test)]
 mod tests {
-    use crate::fronts::multifrontal::tests::{chain, sines};
     use super::*;
+    use crate::fronts::multifrontal::tests::{chain, sines};
 
     /// Solves with a factor that is off by `error` and returns the largest difference from the true solution.
     fn solve_with_spoilt_factor(error: f64) -> f64 {

@@ -9,9 +9,9 @@ use super::Source;
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
-use skinwright_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
 use crate::mesh::TriMesh;
 use crate::surface::SurfacePoint;
+use skinwright_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
 
 /// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;

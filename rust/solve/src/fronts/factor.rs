@@ -8,10 +8,10 @@ use pulp::Arch;
 use crate::fronts::blocks::{BLOCK, FORK, middle_row, panel_index};
 use crate::fronts::buffer::Buffer;
 use crate::fronts::extend_add::{Child, add_children};
-use crate::ordering::graph::Graph;
-use crate::kernels::{Eliminate, Pivot, Product};
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
+use crate::kernels::{Eliminate, Pivot, Product};
+use crate::ordering::graph::Graph;
 use crate::{NotPositive, pivot_floor};
 
 /// Block columns that are eliminated on one thread before all threads use them on the rows below.

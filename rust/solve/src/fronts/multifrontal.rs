@@ -3,16 +3,16 @@
 use glam::Vec3;
 use pulp::Arch;
 
-use crate::substitute::backward::backward;
 use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
-use crate::ordering::dissection::dissect;
 use crate::fronts::factor::factor;
-use crate::substitute::forward::forward;
+use crate::fronts::tree::Tree;
+use crate::ordering::dissection::dissect;
 use crate::ordering::graph::Graph;
+use crate::substitute::backward::backward;
+use crate::substitute::forward::forward;
 use crate::substitute::solution::{Part, RightHandSides, Solution};
 use crate::substitute::substitution::Columns;
-use crate::fronts::tree::Tree;
 use crate::{NotPositive, SymmetricMatrix};
 
 /// Right-hand sides solved together.
@@ -73,8 +73,8 @@ impl Multifrontal {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use crate::supernodal::Supernodal;
     use super::*;
+    use crate::supernodal::Supernodal;
 
     /// A chain of unknowns, each coupled to its next thirty.
     pub(crate) fn chain(n: usize) -> (SymmetricMatrix, Vec<Vec3>) {

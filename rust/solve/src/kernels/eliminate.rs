@@ -2,8 +2,8 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::fronts::blocks::BLOCK;
 use super::{divide, pivot_block, product, vector_place};
+use crate::fronts::blocks::BLOCK;
 
 /// Factors the block columns `first..last` of the row blocks `rows` of a panel, earlier ones being subtracted already.
 /// `pivots` are the panel's row blocks before them, complete up to `last`.

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use crate::fronts::blocks::BLOCK;
 use super::{RowBlocks, product, vector_place};
+use crate::fronts::blocks::BLOCK;
 
 /// Columns that a product sums up before it stores, and row blocks it keeps at hand meanwhile: half a megabyte.
 const DEPTH: usize = 256;

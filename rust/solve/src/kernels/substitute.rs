@@ -2,8 +2,8 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::fronts::blocks::BLOCK;
 use super::{RowBlocks, divide, eight_columns, pivot_block, product};
+use crate::fronts::blocks::BLOCK;
 
 /// What a kernel does to `V` neighbouring vectors of right-hand sides from `at` on, with sums for `C` rows at a time.
 trait Strip {

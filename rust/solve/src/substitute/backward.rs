@@ -4,10 +4,10 @@ use pulp::Arch;
 
 use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
-use crate::kernels::Backward;
-use crate::substitute::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::BRANCHES;
+use crate::kernels::Backward;
+use crate::substitute::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
 
 /// Subtrees with more columns than this are divided between threads, unless there are [`BRANCHES`] larger ones for each.
 const FORK_COLUMNS: usize = 1000;

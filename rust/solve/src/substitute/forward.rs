@@ -7,10 +7,10 @@ use pulp::Arch;
 
 use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
-use crate::kernels::{Apply, Forward};
-use crate::substitute::substitution::{Columns, FORK, PIVOT_BLOCKS, row_blocks};
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
+use crate::kernels::{Apply, Forward};
+use crate::substitute::substitution::{Columns, FORK, PIVOT_BLOCKS, row_blocks};
 
 /// The columns that are not zero in a subtree, in the order in which its fronts store them.
 #[derive(Clone, Copy)]

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use crate::fronts::blocks::{BLOCK, panel_len};
-use crate::substitute::solution::RightHandSides;
 use crate::fronts::tree::Front;
+use crate::substitute::solution::RightHandSides;
 
 /// Work of a front (multiplications) worth a second thread.
 pub(crate) const FORK: usize = 1 << 19;
