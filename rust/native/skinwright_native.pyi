@@ -147,6 +147,25 @@ def transfer_weights(
     island_policy: IslandPolicy = "bridge",
     threads: int = 0,
 ) -> Transfer: ...
+def fill(
+    positions: ArrayLike,
+    triangles: ArrayLike,
+    kinds: ArrayLike,
+    rows: ArrayLike,
+    *,
+    confidence: ArrayLike | None = None,
+    length: float = 0.0,
+    weld: ArrayLike | None = None,
+    threads: int = 0,
+) -> NDArray[np.float64]:
+    """Values at all vertices (V, C) from values at some: minimises the sum over columns of w'(S + length^2 S M^-1 S)w plus
+    b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
+
+    `positions` (V, 3), `triangles` (T, 3); `kinds` (V,): 0 free, 1 fixed, 2 soft; `rows` (V, C): the known values;
+    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution; `weld` (V,):
+    for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
+    """
+
 def linear_blend(
     rest_positions: ArrayLike, weights: Weights, pose_from_rest: ArrayLike, *, threads: int = 0
 ) -> NDArray[np.float32]:

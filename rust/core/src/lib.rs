@@ -8,6 +8,7 @@
 pub mod adjacency;
 pub mod desparsify;
 pub mod error;
+pub mod fill;
 pub mod laplacian;
 pub mod mesh;
 pub mod progress;
@@ -16,8 +17,10 @@ pub mod skinning;
 pub mod surface;
 pub mod transfer;
 pub mod weights;
+pub mod weld;
 
 pub use error::{Error, Result};
 pub use mesh::TriMesh;
 pub use progress::Progress;
 pub use weights::Weights;
+pub use weld::Weld;

@@ -35,6 +35,11 @@ impl<'a> TriMesh<'a> {
         Ok(Self { positions, triangles })
     }
 
+    /// The same without a look, for arrays that were checked before; there may be no triangle at all.
+    pub(crate) fn of_checked(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> Self {
+        Self { positions, triangles }
+    }
+
     /// Positions, (V, 3).
     pub fn positions(&self) -> &'a [[f32; 3]] {
         self.positions

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Fixture, Row, body, button, degenerate, rigid_motion, skirt};
 use skinwright_core::transfer::{
-    Inpainting, IslandPolicy, Length, MaskValue, Settings, Source, Transfer, transfer_weights,
+    Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Source, Transfer, transfer_weights,
 };
 use skinwright_core::{Error, Progress, Weights};
 
@@ -215,7 +215,14 @@ fn the_limit_keeps_the_largest_and_renormalises() {
 fn kept_factorisations_give_the_same_answer_as_fresh_ones() {
     let target = skirt();
     let progress = Progress::default();
-    let mut kept = Inpainting::new(source(), target.positions.clone(), target.triangles.clone(), &progress).unwrap();
+    let mut kept = Inpainting::new(
+        source(),
+        target.positions.clone(),
+        target.triangles.clone(),
+        MatchMethod::default(),
+        &progress,
+    )
+    .unwrap();
     let base = Settings { max_distance: Length::Absolute(0.15), ..Settings::default() };
     assert!(kept.solve(None, &base, &progress).unwrap().report.factored_blocks > 0);
     let smoothed = Settings { smoothing_iterations: 2, max_influences: 2, ..base.clone() };
@@ -286,8 +293,8 @@ fn a_cancelled_solve_gives_nothing_and_the_next_one_is_whole() {
     cancelled.cancel();
     let fresh = Progress::default();
     let arrays = || (target.positions.clone(), target.triangles.clone());
-    assert!(Inpainting::new(source(), arrays().0, arrays().1, &cancelled).is_err());
-    let mut kept = Inpainting::new(source(), arrays().0, arrays().1, &fresh).unwrap();
+    assert!(Inpainting::new(source(), arrays().0, arrays().1, MatchMethod::default(), &cancelled).is_err());
+    let mut kept = Inpainting::new(source(), arrays().0, arrays().1, MatchMethod::default(), &fresh).unwrap();
     let settings = Settings::default();
     assert_eq!(kept.solve(None, &settings, &cancelled).unwrap_err(), Error::Cancelled);
     assert_eq!(kept.solve(None, &settings, &fresh).unwrap().weights, transfer(&source(), &target, &settings).weights);

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use skinwright_core::Progress;
-use skinwright_core::transfer as core;
+use skinwright_core::transfer::{self as core, MatchMethod};
 
 use crate::arrays::{Matrix, read_only, triples};
 use crate::error::enter;
@@ -59,7 +59,9 @@ impl Inpainting {
         let positions = triples(&target_positions, "target_positions")?;
         let triangles = triples(&target_triangles, "target_triangles")?;
         let source = source.core.clone();
-        let core = enter(py, threads, || core::Inpainting::new(source, positions, triangles, &Progress::default()))?;
+        let core = enter(py, threads, || {
+            core::Inpainting::new(source, positions, triangles, MatchMethod::default(), &Progress::default())
+        })?;
         let closest = Arc::new(Closest::of(py, &core)?);
         let islands = read_only(py, core.islands().of_vertex().to_vec())?;
         Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, threads })

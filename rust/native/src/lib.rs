@@ -3,6 +3,7 @@
 mod arrays;
 mod desparsify;
 mod error;
+mod fill;
 mod inpainting;
 mod job;
 mod sculpt;
@@ -23,6 +24,8 @@ mod skinwright_native {
     use crate::error::{
         Cancelled, InvalidMesh, InvalidParameter, InvalidWeights, NotSolvable, NothingMatched, SkinwrightError,
     };
+    #[pymodule_export]
+    use crate::fill::fill;
     #[pymodule_export]
     use crate::inpainting::Inpainting;
     #[pymodule_export]

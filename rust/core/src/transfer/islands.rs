@@ -45,7 +45,6 @@ pub struct UnmatchedIsland {
 pub(super) struct Scene<'a> {
     pub source: &'a Source,
     pub mesh: TriMesh<'a>,
-    pub triangles: &'a [[u32; 3]],
     pub islands: &'a Islands,
     /// Closest source point of each vertex.
     pub points: &'a [SurfacePoint],
@@ -165,7 +164,7 @@ impl<'a> Bridging<'a> {
     fn new(scene: &'a Scene<'a>, weights: &'a Weights, members: &'a [Vec<u32>]) -> Self {
         let mut triangles = vec![Vec::new(); members.len()];
         let mut solved = Vec::new();
-        for &t in scene.triangles {
+        for &t in scene.mesh.triangles() {
             let island = scene.islands.of_vertex()[t[0] as usize] as usize;
             if scene.has_match[island] { solved.push(t) } else { triangles[island].push(t) }
         }

@@ -1,15 +1,16 @@
 //! A target prepared on a source: matching found once, factorisations kept.
 
-use super::blocks::{Blocks, Solved};
+use glam::Vec3;
+
 use super::islands::Scene;
-use super::matching::Closest;
+use super::matching::{Matches, TargetSurface};
 use super::problem::Problem;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
-use super::{Criteria, MaskValue, Settings, Source, Transfer, limit, smooth};
-use crate::adjacency::{Islands, NONE, Topology};
+use super::{Criteria, MaskValue, MatchMethod, Settings, Source, Transfer, limit, smooth};
+use crate::adjacency::{Islands, NONE};
 use crate::error::{Error, Result};
-use crate::laplacian::Laplacian;
+use crate::fill::{Constraint, Fill, Filled, Row};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::SurfacePoint;
@@ -17,19 +18,15 @@ use crate::weights::Weights;
 
 /// A target prepared for solving again and again.
 ///
-/// Closest points are found once. A block is factored again only when its unknowns or the smoothness length change;
-/// changing smoothing, limit, policy or the source's weights factors nothing.
+/// Points on the source are found once for each [`MatchMethod`]. A block is factored again only when its unknowns, their
+/// confidences or the smoothness length change; changing smoothing, limit, policy or the source's weights factors nothing.
 #[derive(Debug)]
 pub struct Inpainting {
     pub(super) source: Source,
-    positions: Vec<[f32; 3]>,
-    /// Without repeated vertices and duplicates.
-    triangles: Vec<[u32; 3]>,
+    fill: Fill,
+    normals: Vec<Vec3>,
     pub(super) diagonal: f64,
-    pub(super) islands: Islands,
-    laplacian: Laplacian,
-    pub(super) closest: Closest,
-    blocks: Blocks,
+    pub(super) matches: Matches,
     preparation: Vec<(&'static str, f64)>,
 }
 
@@ -43,7 +40,8 @@ pub struct RawWeights {
 }
 
 impl Inpainting {
-    /// Prepares a target mesh (V positions in the source's space, T triangles).
+    /// Prepares a target mesh (V positions in the source's space, T triangles) for `method`; a solve with another one
+    /// finds its points anew.
     ///
     /// # Errors
     /// Those of [`TriMesh::new`], [`Error::Cancelled`].
@@ -51,48 +49,35 @@ impl Inpainting {
         source: Source,
         positions: Vec<[f32; 3]>,
         triangles: Vec<[u32; 3]>,
+        method: MatchMethod,
         progress: &Progress,
     ) -> Result<Self> {
         let mut stages = Stages::start();
         let mesh = TriMesh::new(&positions, &triangles, "target")?;
-        let diagonal = mesh.diagonal();
-        let closest = Closest::new(&source, &mesh);
+        let (diagonal, normals) = (mesh.diagonal(), mesh.vertex_normals());
+        let matches = Matches::find(method, &source, TargetSurface { positions: &positions, normals: &normals });
         stages.end("match");
         progress.report(0.3);
         progress.check()?;
-        let topology = Topology::new(&triangles, positions.len());
-        let laplacian = Laplacian::new(&mesh, &topology);
+        let fill = Fill::new(positions, triangles, None)?;
         stages.end("laplacian");
         progress.report(0.4);
-        let Topology { triangles: clean, islands, .. } = topology;
-        let triangles = if clean.len() == triangles.len() { triangles } else { clean.into_owned() };
-        let preparation = stages.into_seconds();
-        Ok(Self {
-            source,
-            diagonal,
-            islands,
-            laplacian,
-            closest,
-            positions,
-            triangles,
-            blocks: Blocks::default(),
-            preparation,
-        })
+        Ok(Self { source, fill, normals, diagonal, matches, preparation: stages.into_seconds() })
     }
 
-    /// Closest source point of each vertex (V).
+    /// The point of each vertex (V) on the source that distance, angle and policies refer to.
     pub fn points(&self) -> &[SurfacePoint] {
-        &self.closest.points
+        self.matches.points()
     }
 
-    /// Angle between the normals of each vertex and of its closest point (V), radians, NaN where a normal is missing.
+    /// Angle between the normals of each vertex and of its point (V), radians, NaN where a normal is missing.
     pub fn angles(&self) -> &[f32] {
-        &self.closest.angles
+        self.matches.angles()
     }
 
     /// The target's islands.
     pub fn islands(&self) -> &Islands {
-        &self.islands
+        self.fill.islands()
     }
 
     /// Gives the source other weights (V rows); nothing geometric is computed anew.
@@ -101,18 +86,17 @@ impl Inpainting {
     /// Those of [`Source::with_weights`].
     pub fn set_source_weights(&mut self, weights: Weights) -> Result<()> {
         self.source = self.source.with_weights(weights)?;
-        self.closest.refresh_weighted(&self.source);
+        self.matches.refresh_weighted(&self.source);
         Ok(())
     }
 
-    /// Which vertices match (V), given a `mask` (V) and the distances and angles of `settings`.
+    /// Which vertices match (V), given a `mask` (V) and the thresholds of `settings`.
     ///
     /// # Errors
     /// [`Error::InvalidParameter`], [`Error::LengthMismatch`].
-    pub fn matched(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<bool>> {
-        settings.check()?;
-        self.check_mask(mask)?;
-        Ok(self.closest.matched(&self.criteria(settings), mask))
+    pub fn matched(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<bool>> {
+        self.prepare_for(settings.method);
+        Ok(matched(&self.constraints(mask, settings)?))
     }
 
     /// Transfers the source's weights, given a `mask` (V).
@@ -122,16 +106,19 @@ impl Inpainting {
     /// [`Error::LengthMismatch`], [`Error::Cancelled`]. A failed solve leaves the kept blocks usable.
     pub fn solve(&mut self, mask: Option<&[MaskValue]>, settings: &Settings, progress: &Progress) -> Result<Transfer> {
         let mut stages = Stages::start();
+        self.prepare_for(settings.method);
         let problem = Problem::new(self, mask, settings)?;
-        let missing = self.blocks.assemble_missing(&self.laplacian, &problem, progress)?;
-        let factored_blocks = missing.len();
+        let assembled = self.fill.assemble(problem.constraints.clone(), problem.smoothness_length, progress)?;
+        let factored_blocks = assembled.missing_blocks();
         stages.end("assemble");
-        let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
-        self.blocks.factor(&mesh, missing, progress)?;
+        self.fill.factor(assembled, progress)?;
+        progress.report(0.7);
+        progress.check()?;
         stages.end("factor");
-        let solved = self.blocks.solve(&self.source, &self.closest.points, progress)?;
+        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
+        let filled = self.fill.solve(&given, progress)?;
         stages.end("solve");
-        let weights = self.gather(&problem, &solved);
+        let weights = self.gather(&filled);
         stages.end("gather");
         let weights = self.smooth(weights, &problem, settings);
         stages.end("smooth");
@@ -140,26 +127,27 @@ impl Inpainting {
         let weights =
             if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
         stages.end("islands and limit");
+        let matched = matched(&problem.constraints);
         let (source_unweighted, source_unnormalised) = self.source.unweighted_and_unnormalised();
         let report = Report {
             unmatched_islands,
             factored_blocks,
             source_unweighted,
             source_unnormalised,
-            matched: count(&problem.matched),
-            inpainted: count(&problem.unknown),
-            loose: self.islands.of_vertex().iter().filter(|&&island| island == NONE).count(),
-            islands: self.islands.count(),
-            blocks: self.blocks.count(),
+            matched: count(&matched),
+            inpainted: count(self.fill.unknown()),
+            loose: self.islands().of_vertex().iter().filter(|&&island| island == NONE).count(),
+            islands: self.islands().count(),
+            blocks: self.fill.block_count(),
             max_distance: problem.criteria.max_distance,
             smoothness_length: problem.smoothness_length,
-            raw_minimum: solved.minimum(),
-            largest_residual: solved.largest_residual(),
+            raw_minimum: filled.minimum(),
+            largest_residual: filled.largest_residual(),
             seconds: self.preparation.iter().copied().chain(stages.into_seconds()).collect(),
             ..Report::of_weights(&weights)
         };
         progress.report(1.0);
-        Ok(Transfer { weights, matched: problem.matched, report })
+        Ok(Transfer { weights, matched, report })
     }
 
     /// The solutions of the blocks as they are, for checks against other solvers.
@@ -167,21 +155,38 @@ impl Inpainting {
     /// # Errors
     /// Those of [`Inpainting::solve`].
     pub fn raw_weights(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<RawWeights> {
-        let problem = Problem::new(self, mask, settings)?;
+        self.prepare_for(settings.method);
         let progress = Progress::default();
-        let missing = self.blocks.assemble_missing(&self.laplacian, &problem, &progress)?;
-        let mesh = TriMesh::new(&self.positions, &self.triangles, "target")?;
-        self.blocks.factor(&mesh, missing, &progress)?;
-        let solved = self.blocks.solve(&self.source, &self.closest.points, &progress)?;
-        let places = solved.places(self.positions.len());
-        let vertices: Vec<u32> = (0..places.len() as u32).filter(|&i| problem.unknown[i as usize]).collect();
+        let problem = Problem::new(self, mask, settings)?;
+        let assembled = self.fill.assemble(problem.constraints, problem.smoothness_length, &progress)?;
+        self.fill.factor(assembled, &progress)?;
+        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
+        let filled = self.fill.solve(&given, &progress)?;
+        let unknown = self.fill.unknown();
+        let vertices: Vec<u32> = (0..unknown.len() as u32).filter(|&i| unknown[i as usize]).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
+        let mut row = Row::new();
         for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
-            let (b, k) = places[i as usize];
-            solved.row(b, k).for_each(|(bone, value)| values[bone as usize] = value);
+            row.clear();
+            filled.append_row(i as usize, &mut row);
+            row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
         }
         Ok(RawWeights { vertices, values })
+    }
+
+    /// Finds the points of another method, if it is another.
+    fn prepare_for(&mut self, method: MatchMethod) {
+        if self.matches.method() != method {
+            let target = TargetSurface { positions: self.fill.mesh().positions(), normals: &self.normals };
+            self.matches = Matches::find(method, &self.source, target);
+        }
+    }
+
+    pub(super) fn constraints(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<Constraint>> {
+        settings.check()?;
+        self.check_mask(mask)?;
+        Ok(self.matches.constraints(&self.criteria(settings), mask))
     }
 
     pub(super) fn criteria(&self, settings: &Settings) -> Criteria {
@@ -193,24 +198,18 @@ impl Inpainting {
     }
 
     fn check_mask(&self, mask: Option<&[MaskValue]>) -> Result<()> {
-        let expected = self.positions.len();
+        let expected = self.normals.len();
         match mask.map(<[MaskValue]>::len) {
             Some(found) if found != expected => Err(Error::LengthMismatch { what: "mask", found, expected }),
             _ => Ok(()),
         }
     }
 
-    /// Copies matched rows, clamps and normalises solved ones; rows of islands without a match stay empty.
-    fn gather(&self, problem: &Problem, solved: &Solved<'_>) -> Weights {
-        let places = solved.places(self.positions.len());
-        Weights::from_rows(self.positions.len(), self.source.n_bones(), Vec::new, |row, i, out| {
+    /// Clamps and normalises the rows; those of islands without a match stay empty.
+    fn gather(&self, filled: &Filled<'_>) -> Weights {
+        Weights::from_rows(self.normals.len(), self.source.n_bones(), Vec::new, |row, i, out| {
             row.clear();
-            let (b, k) = places[i];
-            if b != NONE {
-                row.extend(solved.row(b, k));
-            } else if problem.matched[i] {
-                self.source.blend(&self.closest.points[i], row);
-            }
+            filled.append_row(i, row);
             push_normalised(row, out);
         })
     }
@@ -219,23 +218,25 @@ impl Inpainting {
         if settings.smoothing_iterations == 0 || settings.smoothing_factor == 0.0 {
             return weights;
         }
-        let mesh = TriMesh::new(&self.positions, &self.triangles, "target").expect("checked when prepared");
-        let reach = problem.criteria.max_distance;
-        let region = smooth::region(&mesh, &self.laplacian, &problem.unknown, reach);
-        smooth::smooth(weights, &self.laplacian, &region, settings.smoothing_iterations, settings.smoothing_factor)
+        let (mesh, laplacian) = (self.fill.mesh(), self.fill.laplacian());
+        let region = smooth::region(&mesh, laplacian, self.fill.unknown(), problem.criteria.max_distance);
+        smooth::smooth(weights, laplacian, &region, settings.smoothing_iterations, settings.smoothing_factor)
     }
 
     fn scene<'a>(&'a self, problem: &'a Problem) -> Scene<'a> {
         Scene {
             source: &self.source,
-            mesh: TriMesh::new(&self.positions, &self.triangles, "target").expect("checked when prepared"),
-            triangles: &self.triangles,
-            islands: &self.islands,
-            points: &self.closest.points,
+            mesh: self.fill.mesh(),
+            islands: self.islands(),
+            points: self.matches.points(),
             has_match: &problem.has_match,
             max_distance: problem.criteria.max_distance,
         }
     }
+}
+
+fn matched(constraints: &[Constraint]) -> Vec<bool> {
+    constraints.iter().map(|&known| known == Constraint::Fixed).collect()
 }
 
 fn count(flags: &[bool]) -> usize {

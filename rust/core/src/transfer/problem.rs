@@ -1,42 +1,41 @@
-//! Who is matched, who is unknown, and which lengths are in force.
+//! What is known of each vertex, and which lengths are in force.
 
 use super::{Criteria, Inpainting, Length, MaskValue, Settings};
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
+use crate::fill::Constraint;
 
-/// Unknowns and lengths of one solve.
+/// Constraints and lengths of one solve.
 pub(super) struct Problem {
     pub criteria: Criteria,
     pub smoothness_length: f64,
-    pub matched: Vec<bool>,
-    /// Whether each island holds a match.
+    /// What is known of each vertex, (V).
+    pub constraints: Vec<Constraint>,
+    /// Whether anything is known on each island.
     pub has_match: Vec<bool>,
-    /// Unmatched vertices of islands that hold a match.
-    pub unknown: Vec<bool>,
 }
 
 impl Problem {
-    /// Decides who is matched, unknown, or on an island without a match.
+    /// Decides what is known, and which islands hang on nothing.
     pub fn new(target: &Inpainting, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Self> {
-        let matched = target.matched(mask, settings)?;
+        let constraints = target.constraints(mask, settings)?;
         let criteria = target.criteria(settings);
-        let of_vertex = target.islands.of_vertex();
-        let mut has_match = vec![false; target.islands.count()];
-        for (&island, _) in std::iter::zip(of_vertex, &matched).filter(|&(&island, &m)| m && island != NONE) {
+        let of_vertex = target.islands().of_vertex();
+        let mut has_match = vec![false; target.islands().count()];
+        let known = std::iter::zip(of_vertex, &constraints);
+        for (&island, _) in known.filter(|&(&island, c)| island != NONE && c.is_known()) {
             has_match[island as usize] = true;
         }
         if !has_match.contains(&true) {
             return Err(nothing_matched(target, &criteria, mask, settings));
         }
-        let is_unknown = |(&island, &m): (&u32, &bool)| !m && island != NONE && has_match[island as usize];
-        let unknown = std::iter::zip(of_vertex, &matched).map(is_unknown).collect();
         let smoothness_length = settings.smoothness_length.of(target.source.diagonal());
-        Ok(Self { criteria, smoothness_length, matched, has_match, unknown })
+        Ok(Self { criteria, smoothness_length, constraints, has_match })
     }
 }
 
 fn nothing_matched(target: &Inpainting, criteria: &Criteria, mask: Option<&[MaskValue]>, settings: &Settings) -> Error {
-    let needed = target.closest.smallest_matching_distance(criteria, mask);
+    let needed = target.matches.smallest_matching_distance(criteria, mask);
     let relative = |needed: f64| match settings.max_distance {
         Length::Relative(_) => format!(" ({:.4} of the target's diagonal)", needed / target.diagonal),
         Length::Absolute(_) => String::new(),

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
@@ -102,14 +101,11 @@ impl Source {
         merge_and_normalise(row, start);
     }
 
-    /// Whether [`Source::blend`] gives anything at each point.
-    pub(super) fn weighted(&self, points: &[SurfacePoint]) -> Vec<bool> {
+    /// Whether [`Source::blend`] appends anything at a point.
+    pub(super) fn is_weighted(&self, point: &SurfacePoint) -> bool {
+        let corners = self.geometry.triangles[point.triangle as usize];
         let inverse_sums = &self.weights.inverse_sums;
-        let has_weight = |point: &SurfacePoint| {
-            let corners = self.geometry.triangles[point.triangle as usize];
-            std::iter::zip(corners, point.barycentric).any(|(i, share)| share * inverse_sums[i as usize] > 0.0)
-        };
-        points.par_iter().map(has_weight).collect()
+        std::iter::zip(corners, point.barycentric).any(|(i, share)| share * inverse_sums[i as usize] > 0.0)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The linear system of the inpainting: independent blocks of unknowns, and the rows of Q = S + l^2 S M^-1 S.
+//! The linear system: independent blocks of unknowns, and the rows of Q = S + l^2 S M^-1 S.
 
 use rayon::prelude::*;
 
@@ -10,11 +10,11 @@ use skinwright_solve::SymmetricMatrix;
 const ROWS_A_RUN: usize = 1024;
 
 /// Finds the independent blocks among `unknown` vertices (V): connected components of the two-ring graph, or of the
-/// one-ring graph where `smoothness_length` is 0. Each ascending, ordered by first vertex.
-pub fn independent_blocks(laplacian: &Laplacian, unknown: &[bool], smoothness_length: f64) -> Vec<Vec<u32>> {
+/// one-ring graph where `length` is 0. Each ascending, ordered by first vertex.
+pub fn independent_blocks(laplacian: &Laplacian, unknown: &[bool], length: f64) -> Vec<Vec<u32>> {
     let mut sets = DisjointSets::new(unknown.len());
     for i in 0..unknown.len() {
-        if smoothness_length == 0.0 && !unknown[i] {
+        if length == 0.0 && !unknown[i] {
             continue;
         }
         let mut first = if unknown[i] { Some(i as u32) } else { None };
@@ -41,11 +41,11 @@ pub fn number_unknowns(blocks: &[Vec<u32>], vertex_count: usize) -> Vec<u32> {
     number
 }
 
-/// Q_UI of a block: for each unknown, its matched two-ring. `vertices` are the distinct matched vertices, and `columns`
+/// Q_UI of a block: for each unknown, its fixed two-ring. `vertices` are the distinct fixed vertices, and `columns`
 /// index into them.
 #[derive(Debug, Default)]
 pub struct Boundary {
-    /// Distinct matched vertices, ascending.
+    /// Distinct fixed vertices, ascending.
     pub vertices: Vec<u32>,
     /// Row starts, (unknowns + 1).
     pub starts: Vec<usize>,
@@ -56,14 +56,9 @@ pub struct Boundary {
 }
 
 /// Q_UU and Q_UI of the block of `unknowns`; `number` is from [`number_unknowns`]. The pattern is the structural
-/// two-ring, or one-ring where `smoothness_length` is 0: exact zeros stay, so that the pattern is symmetric.
-pub fn assemble(
-    laplacian: &Laplacian,
-    unknowns: &[u32],
-    number: &[u32],
-    smoothness_length: f64,
-) -> (SymmetricMatrix, Boundary) {
-    let assemble = |run: &[u32]| Rows::assemble(laplacian, run, number, smoothness_length);
+/// two-ring, or one-ring where `length` is 0: exact zeros stay, so that the pattern is symmetric.
+pub fn assemble(laplacian: &Laplacian, unknowns: &[u32], number: &[u32], length: f64) -> (SymmetricMatrix, Boundary) {
+    let assemble = |run: &[u32]| Rows::assemble(laplacian, run, number, length);
     Rows::concatenate(unknowns.par_chunks(ROWS_A_RUN).map(assemble).collect())
 }
 
@@ -80,11 +75,11 @@ struct Rows {
 }
 
 impl Rows {
-    fn assemble(laplacian: &Laplacian, unknowns: &[u32], number: &[u32], smoothness_length: f64) -> Self {
+    fn assemble(laplacian: &Laplacian, unknowns: &[u32], number: &[u32], length: f64) -> Self {
         let mut rows = Self::default();
         let (mut sum, mut entries) = (RowSum::new(), Vec::new());
         for &u in unknowns {
-            row_of_q(laplacian, u, smoothness_length, &mut sum);
+            row_of_q(laplacian, u, length, &mut sum);
             sum.drain_sorted(&mut entries);
             for &(v, value) in &entries {
                 let k = number[v as usize];
@@ -133,11 +128,11 @@ impl Boundary {
 }
 
 /// Adds row u of Q to `sum`.
-fn row_of_q(laplacian: &Laplacian, u: u32, smoothness_length: f64, sum: &mut RowSum) {
+fn row_of_q(laplacian: &Laplacian, u: u32, length: f64, sum: &mut RowSum) {
     add_row_of_s(laplacian, u, 1.0, sum);
-    if smoothness_length > 0.0 {
+    if length > 0.0 {
         let (neighbours, cotangents) = laplacian.row(u as usize);
-        let l2 = smoothness_length * smoothness_length;
+        let l2 = length * length;
         let scale = |a: u32, s_ua: f64| l2 * s_ua / laplacian.mass(a as usize);
         add_row_of_s(laplacian, u, scale(u, laplacian.diagonal(u as usize)), sum);
         for (&a, &cotangent) in std::iter::zip(neighbours, cotangents) {

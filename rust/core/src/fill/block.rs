@@ -1,0 +1,164 @@
+//! One independent block of unknowns: assembled, factored, solved for any number of columns.
+
+use rayon::prelude::*;
+use skinwright_solve::{Cholesky, RightHandSides, Solution, SymmetricMatrix};
+
+use super::constraint::Known;
+use super::rows::{KnownRows, Row};
+use super::system::{self, Boundary};
+use crate::error::{Error, Result};
+use crate::laplacian::Laplacian;
+
+/// Backward error above which a solution is refused.
+const REFUSE_ABOVE: f64 = 1e-8;
+
+/// The assembled system of a block of unknowns.
+#[derive(Debug)]
+pub struct System {
+    unknowns: Vec<u32>,
+    soft: Vec<(u32, f64)>,
+    length: f64,
+    matrix: SymmetricMatrix,
+    boundary: Boundary,
+}
+
+impl System {
+    /// Assembles the block of `unknowns`; `number` is from [`system::number_unknowns`].
+    pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], length: f64) -> Self {
+        let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, length);
+        let soft: Vec<_> = soft_unknowns(known, &unknowns).collect();
+        for &(k, confidence) in &soft {
+            matrix.values[matrix.column_starts[k as usize]] += confidence;
+        }
+        Self { unknowns, soft, length, matrix, boundary }
+    }
+}
+
+/// Which of a block's unknowns are pulled towards a row, and their confidences.
+fn soft_unknowns(known: &Known, unknowns: &[u32]) -> impl Iterator<Item = (u32, f64)> {
+    let with_confidence = std::iter::zip(0.., unknowns).map(|(k, &i)| (k, known.confidence(i)));
+    with_confidence.filter(|&(_, confidence)| confidence > 0.0)
+}
+
+/// A factored block of unknowns. It depends on the mesh, on which vertices are unknown, on confidences and on l; never on
+/// rows.
+#[derive(Debug)]
+pub struct Block {
+    unknowns: Vec<u32>,
+    /// Places of the soft unknowns and their confidences.
+    soft: Vec<(u32, f64)>,
+    length: f64,
+    boundary: Boundary,
+    factor: Cholesky,
+}
+
+/// Rows of a block's unknowns.
+#[derive(Debug)]
+pub struct BlockRows<'b> {
+    columns: Vec<u32>,
+    values: Values<'b>,
+}
+
+#[derive(Debug)]
+enum Values<'b> {
+    /// All rows known around the block have one column, and one value in it: so have all its unknowns, for constants cost
+    /// no energy.
+    Constant(f64),
+    Solved(Solution<'b>),
+}
+
+impl BlockRows<'_> {
+    /// Columns and values of the block's unknown `k`, by column.
+    pub fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let (constant, solution) = match &self.values {
+            Values::Constant(value) => (Some(*value), None),
+            Values::Solved(solution) => (None, Some(solution)),
+        };
+        let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
+        std::iter::zip(self.columns.iter().copied(), values)
+    }
+
+    /// Backward error of the solve.
+    pub fn residual(&self) -> f64 {
+        match &self.values {
+            Values::Constant(_) => 0.0,
+            Values::Solved(solution) => solution.residual(),
+        }
+    }
+}
+
+impl Block {
+    /// Factors an assembled block; `positions` are those of all vertices.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] with a vertex of the block.
+    pub fn new(positions: &[[f32; 3]], system: System) -> Result<Self> {
+        let System { unknowns, soft, length, matrix, boundary } = system;
+        let positions: Vec<_> = unknowns.iter().map(|&i| positions[i as usize].into()).collect();
+        let factor = Cholesky::factor(matrix, &positions)
+            .map_err(|e| Error::NotPositiveDefinite { vertex: unknowns[e.unknown] as usize })?;
+        Ok(Self { unknowns, soft, length, boundary, factor })
+    }
+
+    /// The block's vertices, ascending.
+    pub fn unknowns(&self) -> &[u32] {
+        &self.unknowns
+    }
+
+    /// Whether this factorisation serves the block of `unknowns` with the confidences of `known` at `length`.
+    pub(super) fn serves(&self, unknowns: &[u32], known: &Known, length: f64) -> bool {
+        self.length == length
+            && self.unknowns == unknowns
+            && soft_unknowns(known, unknowns).eq(self.soft.iter().copied())
+    }
+
+    /// Rows of the unknowns.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] if the backward error stays above 1e-8.
+    pub(super) fn solve(&self, known: KnownRows<'_>) -> Result<BlockRows<'_>> {
+        let fixed: Vec<Row> = self.boundary.vertices.par_iter().map(|&i| known.row(i)).collect();
+        let soft: Vec<Row> = self.soft.par_iter().map(|&(k, _)| known.row(self.unknowns[k as usize])).collect();
+        let rows = || fixed.iter().chain(&soft);
+        let mut columns: Vec<u32> = rows().flatten().map(|&(column, _)| column).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        if let Some([(column, value)]) = rows().next().map(Vec::as_slice)
+            && rows().all(|row| row[..] == [(*column, *value)])
+        {
+            return Ok(BlockRows { columns, values: Values::Constant(*value) });
+        }
+        let solution = self.factor.solve(&self.right_hand_sides(&fixed, &soft, &columns));
+        if solution.residual().is_nan() || solution.residual() > REFUSE_ABOVE {
+            return Err(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize });
+        }
+        Ok(BlockRows { columns, values: Values::Solved(solution) })
+    }
+
+    /// `diag(b) W_0 - Q_UI W_I`, (unknowns, columns).
+    fn right_hand_sides(&self, fixed: &[Row], soft: &[Row], columns: &[u32]) -> RightHandSides {
+        let mut place = vec![0u32; columns.last().map_or(0, |&column| column as usize + 1)];
+        for (k, &column) in columns.iter().enumerate() {
+            place[column as usize] = k as u32;
+        }
+        let mut soft_of = vec![u32::MAX; if soft.is_empty() { 0 } else { self.unknowns.len() }];
+        std::iter::zip(0.., &self.soft).for_each(|(s, &(k, _))| soft_of[k as usize] = s);
+        let soft_of = |u: u32| soft_of.get(u as usize).copied().filter(|&s| s != u32::MAX);
+        let entries = |u: u32| self.boundary.starts[u as usize]..self.boundary.starts[u as usize + 1];
+        let in_band = |&u: &u32| !entries(u).is_empty() || soft_of(u).is_some();
+        let band: Vec<u32> = (0..self.unknowns.len() as u32).filter(in_band).collect();
+        let mut values = vec![0.0; band.len() * columns.len()];
+        values.par_chunks_mut(columns.len().max(1)).zip(&band).with_min_len(256).for_each(|(row, &u)| {
+            let mut add = |known: &Row, factor: f64| {
+                known.iter().for_each(|&(column, value)| row[place[column as usize] as usize] += factor * value);
+            };
+            for at in entries(u) {
+                add(&fixed[self.boundary.columns[at] as usize], -self.boundary.values[at]);
+            }
+            if let Some(s) = soft_of(u) {
+                add(&soft[s as usize], self.soft[s as usize].1);
+            }
+        });
+        RightHandSides::sparse(self.unknowns.len(), columns.len(), &band, values)
+    }
+}

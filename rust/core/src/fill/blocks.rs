@@ -1,0 +1,61 @@
+//! The factored blocks of a mesh, kept from one solve to the next.
+
+use rayon::prelude::*;
+
+use super::block::{Block, BlockRows, System};
+use super::constraint::Known;
+use super::rows::KnownRows;
+use super::system::{independent_blocks, number_unknowns};
+use crate::error::Result;
+use crate::laplacian::Laplacian;
+use crate::progress::Progress;
+
+/// Factored blocks, by first vertex.
+#[derive(Debug, Default)]
+pub(super) struct Blocks(Vec<Block>);
+
+impl Blocks {
+    pub(super) fn as_slice(&self) -> &[Block] {
+        &self.0
+    }
+
+    /// Drops the blocks that `known` has no use for and assembles those that it lacks.
+    pub(super) fn assemble_missing(
+        &mut self,
+        laplacian: &Laplacian,
+        known: &Known,
+        length: f64,
+        progress: &Progress,
+    ) -> Result<Vec<System>> {
+        let wanted = independent_blocks(laplacian, &known.unknown, length);
+        let number = number_unknowns(&wanted, known.unknown.len());
+        self.0.retain(|block| {
+            let at = wanted.binary_search_by_key(&block.unknowns()[0], |unknowns| unknowns[0]);
+            at.is_ok_and(|at| block.serves(&wanted[at], known, length))
+        });
+        let kept = |first| self.0.binary_search_by_key(&first, |block| block.unknowns()[0]).is_ok();
+        let missing: Vec<Vec<u32>> = wanted.into_iter().filter(|unknowns| !kept(unknowns[0])).collect();
+        let assemble = |unknowns| {
+            progress.check()?;
+            Ok(System::new(laplacian, known, unknowns, &number, length))
+        };
+        missing.into_par_iter().map(assemble).collect()
+    }
+
+    /// Factors what was missing and keeps it.
+    pub(super) fn factor(&mut self, positions: &[[f32; 3]], missing: Vec<System>, progress: &Progress) -> Result<()> {
+        let factor = |system| {
+            progress.check()?;
+            Block::new(positions, system)
+        };
+        let fresh: Result<Vec<Block>> = missing.into_par_iter().map(factor).collect();
+        self.0.extend(fresh?);
+        self.0.sort_by_key(|block| block.unknowns()[0]);
+        Ok(())
+    }
+
+    /// Solves all blocks.
+    pub(super) fn solve(&self, known: KnownRows<'_>, progress: &Progress) -> Result<Vec<BlockRows<'_>>> {
+        self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve(known))).collect()
+    }
+}

@@ -1,0 +1,68 @@
+//! The rows of all vertices once everything is solved for.
+
+use rayon::prelude::*;
+
+use super::block::{Block, BlockRows};
+use super::constraint::Constraint;
+use super::rows::{KnownRows, Row};
+use crate::adjacency::NONE;
+
+/// The rows of all vertices, before anybody clamps or normalises them.
+pub struct Filled<'a> {
+    known: KnownRows<'a>,
+    blocks: &'a [Block],
+    rows: Vec<BlockRows<'a>>,
+    /// Block and place in it of each vertex of the mesh that was solved on; [`NONE`] twice where nothing was solved for.
+    places: Vec<(u32, u32)>,
+}
+
+impl<'a> Filled<'a> {
+    pub(super) fn new(known: KnownRows<'a>, blocks: &'a [Block], rows: Vec<BlockRows<'a>>) -> Self {
+        let mut places = vec![(NONE, NONE); known.known.unknown.len()];
+        for (b, block) in blocks.iter().enumerate() {
+            for (k, &i) in block.unknowns().iter().enumerate() {
+                places[i as usize] = (b as u32, k as u32);
+            }
+        }
+        Self { known, blocks, rows, places }
+    }
+
+    fn place(&self, i: usize) -> (u32, u32) {
+        self.places[self.known.weld.map_or(i, |weld| weld.class_of()[i] as usize)]
+    }
+
+    /// Whether the row of vertex `i` was solved for.
+    pub fn is_solved(&self, i: usize) -> bool {
+        self.place(i).0 != NONE
+    }
+
+    /// Appends the row of vertex `i` to `out`, by column: solved for, or the given one. Nothing is appended for a free
+    /// vertex that no known one is connected to.
+    pub fn append_row(&self, i: usize, out: &mut Row) {
+        let at = self.known.weld.map_or(i, |weld| weld.class_of()[i] as usize);
+        match self.places[at] {
+            (NONE, _) => match self.known.known.constraints[at] {
+                Constraint::Fixed => self.known.append(at as u32, out),
+                // Without a triangle there is nothing but the row it is pulled to.
+                Constraint::Soft(b) if b > 0.0 => self.known.append(at as u32, out),
+                Constraint::Soft(_) | Constraint::Free => {}
+            },
+            (b, k) => out.extend(self.rows[b as usize].row(k as usize)),
+        }
+    }
+
+    /// The smallest value solved for, 0 where nothing was.
+    pub fn minimum(&self) -> f64 {
+        let least = std::iter::zip(self.blocks, &self.rows).map(|(block, rows)| {
+            let unknowns = (0..block.unknowns().len()).into_par_iter().with_min_len(256);
+            let least = |k| rows.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+            unknowns.map(least).reduce(|| f64::INFINITY, f64::min)
+        });
+        least.min_by(f64::total_cmp).unwrap_or(0.0)
+    }
+
+    /// The largest backward error of any block's solve.
+    pub fn largest_residual(&self) -> f64 {
+        self.rows.iter().map(BlockRows::residual).fold(0.0, f64::max)
+    }
+}

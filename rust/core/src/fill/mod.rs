@@ -1,0 +1,155 @@
+//! Values known at some vertices of a mesh -> values at all of them.
+//!
+//! Minimises `sum_j w_j' (S + l^2 S M^-1 S) w_j + sum_i b_i |w_i - s_i|^2` over the rows w of all vertices that are not
+//! fixed: S the cotangent stiffness, M the Voronoi areas, l a length (0: harmonic), s_i and b_i row and confidence of soft
+//! vertices. With fixed and free vertices only this is weight inpainting (Abdrashitov et al., *Robust Skin Weights Transfer
+//! via Weight Inpainting*, SIGGRAPH Asia 2023 Technical Communications, doi 10.1145/3610543.3626180).
+//!
+//! Rows go in and rows come out; where they are from is the caller's business. Unknowns that no chain of two-rings connects
+//! never meet in the system, so each such block has a factorisation of its own and only the columns that reach it. A block is
+//! factored again only if its unknowns, their confidences or l change. To solve a patch only, hold the rows around it: make
+//! every vertex outside of it `Fixed` and give its present row.
+
+pub mod block;
+mod blocks;
+mod constraint;
+mod filled;
+mod rows;
+pub mod system;
+
+pub use constraint::Constraint;
+pub use filled::Filled;
+pub use rows::{GivenRows, Row};
+
+use crate::adjacency::{Islands, Topology};
+use crate::error::{Error, Result};
+use crate::laplacian::Laplacian;
+use crate::mesh::TriMesh;
+use crate::progress::Progress;
+use crate::weld::Weld;
+use block::System;
+use blocks::Blocks;
+use constraint::Known;
+use rows::KnownRows;
+
+/// A mesh prepared for filling: topology, Laplacian and the factorisations of the problem posed last.
+#[derive(Debug)]
+pub struct Fill {
+    weld: Option<Weld>,
+    vertex_count: usize,
+    positions: Vec<[f32; 3]>,
+    /// Without repeated vertices and duplicates.
+    triangles: Vec<[u32; 3]>,
+    islands: Islands,
+    laplacian: Laplacian,
+    blocks: Blocks,
+    known: Known,
+}
+
+/// A problem whose missing blocks are assembled and wait to be factored.
+#[derive(Debug)]
+#[must_use = "nothing is factored yet"]
+pub struct Assembled {
+    known: Known,
+    missing: Vec<System>,
+}
+
+impl Assembled {
+    /// Number of blocks to factor.
+    pub fn missing_blocks(&self) -> usize {
+        self.missing.len()
+    }
+}
+
+impl Fill {
+    /// Prepares a mesh (V positions, T triangles). Vertices that `weld` declares to be one are one in the system: S and M
+    /// are assembled on the welded triangles, without those that welding makes degenerate or equal, so that the answer is to
+    /// the bit that of the welded mesh.
+    ///
+    /// # Errors
+    /// Those of [`TriMesh::new`]; [`Error::LengthMismatch`] if `weld` is for another number of vertices.
+    pub fn new(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, weld: Option<Weld>) -> Result<Self> {
+        let vertex_count = positions.len();
+        TriMesh::new(&positions, &triangles, "target")?;
+        let (positions, triangles) = match &weld {
+            None => (positions, triangles),
+            Some(weld) => {
+                let found = weld.class_of().len();
+                if found != vertex_count {
+                    return Err(Error::LengthMismatch { what: "weld", found, expected: vertex_count });
+                }
+                weld.welded(&positions, &triangles)
+            }
+        };
+        let mesh = TriMesh::of_checked(&positions, &triangles);
+        let topology = Topology::new(&triangles, positions.len());
+        let laplacian = Laplacian::new(&mesh, &topology);
+        let Topology { triangles: clean, islands, .. } = topology;
+        let triangles = if clean.len() == triangles.len() { triangles } else { clean.into_owned() };
+        let (blocks, known) = (Blocks::default(), Known::default());
+        Ok(Self { weld, vertex_count, positions, triangles, islands, laplacian, blocks, known })
+    }
+
+    /// The mesh that is solved on: welded, without triangles that name a vertex twice or repeat another.
+    pub fn mesh(&self) -> TriMesh<'_> {
+        TriMesh::of_checked(&self.positions, &self.triangles)
+    }
+
+    /// Its islands.
+    pub fn islands(&self) -> &Islands {
+        &self.islands
+    }
+
+    /// Its stiffness and masses.
+    pub fn laplacian(&self) -> &Laplacian {
+        &self.laplacian
+    }
+
+    /// Number of independent blocks of the problem posed last.
+    pub fn block_count(&self) -> usize {
+        self.blocks.as_slice().len()
+    }
+
+    /// Poses a problem: `constraints` (V) and `length` l >= 0 in world units. Assembles the blocks that are not there yet.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`], [`Error::InvalidParameter`], [`Error::Cancelled`].
+    pub fn assemble(&mut self, constraints: Vec<Constraint>, length: f64, progress: &Progress) -> Result<Assembled> {
+        let (found, expected) = (constraints.len(), self.vertex_count);
+        if found != expected {
+            return Err(Error::LengthMismatch { what: "constraints", found, expected });
+        }
+        if !(length.is_finite() && length >= 0.0) {
+            let must = "must be a finite number, 0 or more";
+            return Err(Error::InvalidParameter { name: "length", value: length, must });
+        }
+        let known = Known::new(constraints, self.weld.as_ref(), &self.islands)?;
+        let missing = self.blocks.assemble_missing(&self.laplacian, &known, length, progress)?;
+        Ok(Assembled { known, missing })
+    }
+
+    /// Factors the blocks that were missing; they are kept until a problem has no use for them.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`], [`Error::Cancelled`]; the blocks that were there before stay usable.
+    pub fn factor(&mut self, assembled: Assembled, progress: &Progress) -> Result<()> {
+        self.blocks.factor(&self.positions, assembled.missing, progress)?;
+        self.known = assembled.known;
+        Ok(())
+    }
+
+    /// Which vertices of the mesh that is solved on are unknowns of the problem posed last.
+    pub fn unknown(&self) -> &[bool] {
+        &self.known.unknown
+    }
+
+    /// Solves the problem posed last for `given` rows; another set of rows costs a solve and nothing else.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] if a solution is not accurate, [`Error::Cancelled`].
+    pub fn solve<'a>(&'a self, given: GivenRows<'a>, progress: &Progress) -> Result<Filled<'a>> {
+        let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
+        let rows = self.blocks.solve(known, progress)?;
+        Ok(Filled::new(known, self.blocks.as_slice(), rows))
+    }
+}

@@ -1,0 +1,131 @@
+//! Which points of the source a target vertex takes its weights from, and how far they are trusted.
+//!
+//! A method finds the points of all vertices once ([`Matches::find`]) and turns them into constraints as often as thresholds
+//! and mask change ([`Matches::constraints`]). To add one: a file in this folder, a variant of [`MatchMethod`], an entry in
+//! [`MatchMethod::ALL`], and an arm in each of those two functions.
+
+mod candidates;
+mod closest;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+pub use candidates::Candidates;
+pub use closest::Criteria;
+
+use super::Source;
+use crate::fill::{Constraint, Row};
+use crate::surface::SurfacePoint;
+
+/// How matching points are found and trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MatchMethod {
+    /// The closest point, copied exactly if its distance and normal are within thresholds and ignored otherwise: the paper's
+    /// method.
+    #[default]
+    ClosestPoint,
+}
+
+impl MatchMethod {
+    /// All methods, for tests and menus.
+    pub const ALL: [Self; 1] = [Self::ClosestPoint];
+}
+
+/// What the artist asks of one vertex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum MaskValue {
+    /// Never match, always inpaint.
+    Inpaint = 0,
+    /// Let distance and angle decide.
+    Automatic = 1,
+    /// Match whatever distance and angle say.
+    ForceMatch = 2,
+}
+
+/// The target as matching sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct TargetSurface<'a> {
+    /// Positions, (V, 3).
+    pub positions: &'a [[f32; 3]],
+    /// Unit normals, zero where there is no direction, (V, 3).
+    pub normals: &'a [Vec3],
+}
+
+/// The points of all vertices, found once.
+#[derive(Debug)]
+pub struct Matches {
+    method: MatchMethod,
+    candidates: Candidates,
+    /// Angle between the target's normal and that of the first candidate (V), radians in [0, pi], NaN where one has no length.
+    angles: Vec<f32>,
+    /// Whether the source has any weight at the candidates (V).
+    weighted: Vec<bool>,
+}
+
+impl Matches {
+    /// Finds the points of all vertices of `target` on `source`.
+    pub fn find(method: MatchMethod, source: &Source, target: TargetSurface<'_>) -> Self {
+        let candidates = match method {
+            MatchMethod::ClosestPoint => closest::find(source, target),
+        };
+        let points = candidates.first_points().par_iter().with_min_len(1024);
+        let angles = points.zip(target.normals).map(|(point, &normal)| angle(source, point, normal)).collect();
+        let weighted = candidates.weighted(source);
+        Self { method, candidates, angles, weighted }
+    }
+
+    /// What `criteria` and the artist's `mask` (V, automatic everywhere if absent) make of the points, (V).
+    pub fn constraints(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
+        match self.method {
+            MatchMethod::ClosestPoint => closest::constraints(self, criteria, mask),
+        }
+    }
+
+    /// The method that found them.
+    pub fn method(&self) -> MatchMethod {
+        self.method
+    }
+
+    /// The point that distance, angle and island policies refer to, (V).
+    pub fn points(&self) -> &[SurfacePoint] {
+        self.candidates.first_points()
+    }
+
+    /// Angle between the normals at each vertex and at that point (V), radians in [0, pi], NaN where one is missing.
+    pub fn angles(&self) -> &[f32] {
+        &self.angles
+    }
+
+    /// Finds out again which points have weights, after the source's weights changed.
+    pub fn refresh_weighted(&mut self, source: &Source) {
+        self.weighted = self.candidates.weighted(source);
+    }
+
+    /// Appends the weights that vertex `i` takes from the source to `row`: normalised, in bone order.
+    pub fn append_row(&self, source: &Source, i: u32, row: &mut Row) {
+        self.candidates.append_row(source, i as usize, row);
+    }
+
+    /// The smallest distance at which some vertex would match, were the largest one that large.
+    pub fn smallest_matching_distance(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Option<f64> {
+        let any_distance = Criteria { max_distance: f64::INFINITY, ..*criteria };
+        let possible = self.constraints(&any_distance, mask);
+        let distances = std::iter::zip(self.points(), possible).filter(|(_, known)| *known != Constraint::Free);
+        distances.map(|(point, _)| point.distance).min_by(f64::total_cmp)
+    }
+}
+
+/// Angle between a target normal and the source normal at `point`, which is the barycentric blend of the
+/// vertex normals. By atan2, so that equal normals give exactly zero.
+fn angle(source: &Source, point: &SurfacePoint, target_normal: Vec3) -> f32 {
+    let corners = source.triangles()[point.triangle as usize];
+    let blend: DVec3 = std::iter::zip(corners, point.barycentric)
+        .map(|(i, share)| source.normals()[i as usize].as_dvec3() * share)
+        .sum();
+    let normal = target_normal.as_dvec3();
+    if blend.length_squared() == 0.0 || normal.length_squared() == 0.0 {
+        return f32::NAN;
+    }
+    normal.cross(blend).length().atan2(normal.dot(blend)) as f32
+}
