@@ -90,7 +90,9 @@ class Case:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        pairs = np.vstack([self.mesh.triangles[:, [0, 1]], self.mesh.triangles[:, [1, 2]], self.mesh.triangles[:, [2, 0]]])
+        pairs = np.vstack(
+            [self.mesh.triangles[:, [0, 1]], self.mesh.triangles[:, [1, 2]], self.mesh.triangles[:, [2, 0]]]
+        )
         return np.unique(np.sort(pairs, axis=1), axis=0)
 
     @cached_property

@@ -57,10 +57,18 @@ class Source:
 class Inpainting:
     """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
 
-    def __init__(self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0) -> None:
+    def __init__(
+        self,
+        source: Source,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        method: str = "paper",
+        threads: int = 0,
+    ) -> None:
         self.name = name
         with _naming(name):
-            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads)
+            self._inpainting = _module.Inpainting(source._source, positions, triangles, method=method, threads=threads)
         self.distance: NDArray[np.float32] = self._inpainting.distance
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands
@@ -69,6 +77,11 @@ class Inpainting:
         """(V,) which vertices match; waits for a job that is going on."""
         with _naming(self.name):
             return self._inpainting.matched(**thresholds)
+
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.confidence(**thresholds)
 
     def start(self, **params: Any) -> "Job":
         """Solve on threads of Rust's own."""

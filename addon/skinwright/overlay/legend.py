@@ -8,10 +8,10 @@ from gpu_extras.batch import batch_for_shader
 from numpy.typing import ArrayLike
 
 from ..match.session import Category
-from .picture import Histogram, Picture
 from . import colours
+from .picture import Histogram, Picture
 
-TITLES = {"MATCH": "Match", "INFLUENCES": "Influences", "STRETCH": "Stretch"}
+TITLES = {"MATCH": "Match", "CONFIDENCE": "Confidence", "INFLUENCES": "Influences", "STRETCH": "Stretch"}
 TEXT = (0.95, 0.95, 0.95, 1.0)
 BACKGROUND = (0.08, 0.08, 0.08, 0.72)
 BARS_BELOW, BARS_ABOVE = (*colours.CATEGORIES[Category.MATCHED], 1.0), (*colours.CATEGORIES[Category.INPAINTED], 1.0)

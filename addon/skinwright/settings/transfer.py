@@ -32,6 +32,33 @@ class TransferOptions:
             ("CURRENT", "Current", "The shapes as they are posed and deformed now"),
         ],
     )
+    method: EnumProperty(
+        name="Method",
+        description="How vertices take weights from the source",
+        items=[
+            (
+                "PAPER",
+                "Match or Inpaint",
+                "Copy where distance and angle are within their thresholds, fill in the rest",
+            ),
+            (
+                "CONFIDENCE",
+                "Confidence",
+                "Trust every vertex's point on the source the less the larger gap and tilt are",
+            ),
+        ],
+    )
+    softness: FloatProperty(
+        name="Softness",
+        description="How far weights are smoothed, as a multiple of the gap between garment and source",
+        default=TransferParams.softness,
+        min=0.05,
+        soft_min=0.35,
+        soft_max=1.4,
+        max=10,
+        precision=2,
+        step=5,
+    )
     distance_mode: EnumProperty(name="Distance", description="How the distance is given", items=LENGTH_MODES)
     relative_max_distance: FloatProperty(
         name="Distance",
@@ -93,6 +120,15 @@ class TransferOptions:
             ("SKIP", "Skip", "Leave the part as it is"),
         ],
     )
+    small_islands: EnumProperty(
+        name="Small Parts",
+        description="What to do with small loose parts that hang off the source, as buttons and pouches",
+        items=[
+            ("AUTO", "Automatic", "Rigid with Confidence, as computed otherwise"),
+            ("RIGID", "Rigid", "Give each part one set of weights if it nearly has one"),
+            ("SOLVED", "As Computed", "Leave them as they are computed"),
+        ],
+    )
     smoothing_iterations: IntProperty(
         name="Smoothing",
         description="Passes of smoothing over the inpainted vertices and their surroundings",
@@ -144,6 +180,10 @@ class TransferOptions:
     def draw_matching(self, layout: UILayout) -> None:
         """Shapes and thresholds."""
         layout.prop(self, "geometry")
+        layout.prop(self, "method")
+        if self.method == "CONFIDENCE":
+            layout.prop(self, "softness")
+            return
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
         layout.prop(self, "max_normal_angle")
         layout.prop(self, "match_flipped_normals")
@@ -152,6 +192,7 @@ class TransferOptions:
         """The solve, loose parts, smoothing."""
         self._draw_length(layout, "smoothness_mode", "relative_smoothness_length", "smoothness_length")
         layout.prop(self, "island_policy")
+        layout.prop(self, "small_islands")
         layout.prop(self, "smoothing_iterations")
         column = layout.column()
         column.active = self.smoothing_iterations > 0
@@ -173,7 +214,7 @@ class TransferOptions:
     def to_params(self, threads: int = 0) -> TransferParams:
         """As plain values; Blender's angles are radians already."""
         same = (
-            "groups relative_max_distance max_normal_angle match_flipped_normals relative_smoothness_length "
+            "groups softness relative_max_distance max_normal_angle match_flipped_normals relative_smoothness_length "
             "smoothing_iterations smoothing_factor max_influences mix_factor selected_only add_armature "
             "make_single_user"
         )
@@ -181,7 +222,9 @@ class TransferOptions:
             evaluated=self.geometry == "CURRENT",
             max_distance=self.max_distance if self.distance_mode == "ABSOLUTE" else None,
             smoothness_length=self.smoothness_length if self.smoothness_mode == "ABSOLUTE" else None,
+            method=self.method.lower(),
             island_policy=self.island_policy.lower(),
+            small_islands=self.small_islands.lower(),
             threads=threads,
             **{name: getattr(self, name) for name in same.split()},
         )

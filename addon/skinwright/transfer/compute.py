@@ -50,7 +50,9 @@ def bone_source(body: Body) -> native.Source:
 def prepare(source: native.Source, garment: Garment, params: TransferParams) -> native.Inpainting:
     """The garment laid over the body; the mask and the thresholds may still change."""
     geometry = garment.geometry
-    return native.Inpainting(source, garment.object.name, geometry.positions, geometry.triangles, params.threads)
+    return native.Inpainting(
+        source, garment.object.name, geometry.positions, geometry.triangles, params.method, params.threads
+    )
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:

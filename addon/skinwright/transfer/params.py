@@ -26,6 +26,8 @@ class TransferParams:
 
     groups: Groups = "BONE_DEFORM"
     evaluated: bool = False
+    method: Literal["paper", "confidence"] = "paper"
+    softness: float = 0.7
     max_distance: float | None = None
     relative_max_distance: float = 0.05
     max_normal_angle: float = math.radians(35)
@@ -37,6 +39,7 @@ class TransferParams:
     smoothing_factor: float = 0.2
     max_influences: int = 0
     island_policy: Literal["bridge", "nearest", "rigid", "skip"] = "bridge"
+    small_islands: Literal["auto", "rigid", "solved"] = "auto"
     mix_factor: float = 1.0
     selected_only: bool = False
     add_armature: bool = True
@@ -46,8 +49,9 @@ class TransferParams:
     def native(self) -> dict[str, Any]:
         """The keyword arguments of the native transfer; the mask is the caller's."""
         names = (
-            "max_distance relative_max_distance max_normal_angle match_flipped_normals smoothness_length "
-            "relative_smoothness_length smoothing_iterations smoothing_factor max_influences island_policy threads"
+            "method softness max_distance relative_max_distance max_normal_angle match_flipped_normals smoothness_length "
+            "relative_smoothness_length smoothing_iterations smoothing_factor max_influences island_policy small_islands "
+            "threads"
         )
         return {name: getattr(self, name) for name in names.split()}
 

@@ -6,12 +6,12 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use skinwright_core::Progress;
-use skinwright_core::transfer::{self as core, MatchMethod};
+use skinwright_core::transfer as core;
 
 use crate::arrays::{Matrix, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
-use crate::settings::keywords;
+use crate::settings::{keywords, method};
 use crate::source::Source;
 use crate::transfer::{Closest, Transfer};
 use crate::weights::Weights;
@@ -48,19 +48,21 @@ fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting
 #[pymethods]
 impl Inpainting {
     #[new]
-    #[pyo3(signature = (source, target_positions, target_triangles, *, threads=0))]
+    #[pyo3(signature = (source, target_positions, target_triangles, *, method="paper", threads=0))]
     fn new(
         py: Python<'_>,
         source: &Source,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
+        method: &str,
         threads: usize,
     ) -> PyResult<Self> {
+        let method = self::method(method)?;
         let positions = triples(&target_positions, "target_positions")?;
         let triangles = triples(&target_triangles, "target_triangles")?;
         let source = source.core.clone();
         let core = enter(py, threads, || {
-            core::Inpainting::new(source, positions, triangles, MatchMethod::default(), &Progress::default())
+            core::Inpainting::new(source, positions, triangles, method, &Progress::default())
         })?;
         let closest = Arc::new(Closest::of(py, &core)?);
         let islands = read_only(py, core.islands().of_vertex().to_vec())?;
@@ -101,6 +103,18 @@ impl Inpainting {
         let (settings, mask) = keywords(settings)?;
         let matched = self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?;
         Ok(PyArray1::from_vec(py, matched))
+    }
+
+    /// How far the row that each vertex takes from the source is trusted (V,), 0 to 1; nothing is solved.
+    #[pyo3(signature = (**settings))]
+    fn confidence<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (settings, mask) = keywords(settings)?;
+        let confidence = self.enter(py, |inpainting| inpainting.confidence(mask.as_deref(), &settings))?;
+        Ok(PyArray1::from_vec(py, confidence))
     }
 
     /// Solves under these settings, factoring only the blocks that changed.

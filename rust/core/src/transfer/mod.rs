@@ -13,6 +13,7 @@ mod prepared;
 mod problem;
 mod report;
 mod settings;
+mod small_islands;
 pub mod smooth;
 mod source;
 
@@ -21,6 +22,7 @@ pub use matching::{Criteria, MaskValue, MatchMethod};
 pub use prepared::{Inpainting, RawWeights};
 pub use report::Report;
 pub use settings::{Length, Settings};
+pub use small_islands::SmallIslands;
 pub use source::Source;
 
 use crate::error::Result;
@@ -32,8 +34,10 @@ use crate::weights::Weights;
 pub struct Transfer {
     /// The new weights: rows sum to 1, bones ascending. Rows of skipped islands are empty.
     pub weights: Weights,
-    /// Which vertices took their weights from the source.
+    /// Which vertices took their weights from the source: those that trust its row by a half or more.
     pub matched: Vec<bool>,
+    /// How far the row from the source was trusted, 0 to 1.
+    pub confidence: Vec<f32>,
     /// Counts, islands and seconds.
     pub report: Report,
 }

@@ -3,11 +3,11 @@
 use glam::Vec3;
 
 use super::islands::Scene;
-use super::matching::{Matches, TargetSurface};
+use super::matching::{Matches, TargetSurface, Terms};
 use super::problem::Problem;
 use super::report::{Report, Stages};
 use super::smooth::push_normalised;
-use super::{Criteria, MaskValue, MatchMethod, Settings, Source, Transfer, limit, smooth};
+use super::{Criteria, MaskValue, MatchMethod, Settings, Source, Transfer, limit, small_islands, smooth};
 use crate::adjacency::{Islands, NONE};
 use crate::error::{Error, Result};
 use crate::fill::{Constraint, Fill, Filled, Row};
@@ -90,13 +90,23 @@ impl Inpainting {
         Ok(())
     }
 
-    /// Which vertices match (V), given a `mask` (V) and the thresholds of `settings`.
+    /// Which vertices match (V), given a `mask` (V) and `settings`: those whose confidence is at least a half.
     ///
     /// # Errors
     /// [`Error::InvalidParameter`], [`Error::LengthMismatch`].
     pub fn matched(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<bool>> {
+        Ok(trusted(&self.confidence(mask, settings)?))
+    }
+
+    /// How far the row that each vertex takes from the source is trusted, 0 to 1 (V): all or nothing with
+    /// [`MatchMethod::ClosestPoint`], and where the mask decides.
+    ///
+    /// # Errors
+    /// [`Error::InvalidParameter`], [`Error::LengthMismatch`].
+    pub fn confidence(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<f32>> {
         self.prepare_for(settings.method);
-        Ok(matched(&self.constraints(mask, settings)?))
+        let constraints = self.constraints(mask, settings)?;
+        Ok(self.matches.confidence(&constraints, settings.softness, mask))
     }
 
     /// Transfers the source's weights, given a `mask` (V).
@@ -115,7 +125,7 @@ impl Inpainting {
         progress.report(0.7);
         progress.check()?;
         stages.end("factor");
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
+        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
         let filled = self.fill.solve(&given, progress)?;
         stages.end("solve");
         let weights = self.gather(&filled);
@@ -123,14 +133,17 @@ impl Inpainting {
         let weights = self.smooth(weights, &problem, settings);
         stages.end("smooth");
         progress.check()?;
+        let (weights, rigid_islands) = self.stiffen(weights, settings);
         let (weights, unmatched_islands) = self.scene(&problem).fill(weights, settings.island_policy);
         let weights =
             if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
         stages.end("islands and limit");
-        let matched = matched(&problem.constraints);
+        let confidence = self.matches.confidence(&problem.constraints, settings.softness, mask);
+        let matched = trusted(&confidence);
         let (source_unweighted, source_unnormalised) = self.source.unweighted_and_unnormalised();
         let report = Report {
             unmatched_islands,
+            rigid_islands,
             factored_blocks,
             source_unweighted,
             source_unnormalised,
@@ -147,7 +160,7 @@ impl Inpainting {
             ..Report::of_weights(&weights)
         };
         progress.report(1.0);
-        Ok(Transfer { weights, matched, report })
+        Ok(Transfer { weights, matched, confidence, report })
     }
 
     /// The solutions of the blocks as they are, for checks against other solvers.
@@ -160,7 +173,7 @@ impl Inpainting {
         let problem = Problem::new(self, mask, settings)?;
         let assembled = self.fill.assemble(problem.constraints, problem.smoothness_length, &progress)?;
         self.fill.factor(assembled, &progress)?;
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
+        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
         let filled = self.fill.solve(&given, &progress)?;
         let unknown = self.fill.unknown();
         let vertices: Vec<u32> = (0..unknown.len() as u32).filter(|&i| unknown[i as usize]).collect();
@@ -186,7 +199,22 @@ impl Inpainting {
     pub(super) fn constraints(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<Constraint>> {
         settings.check()?;
         self.check_mask(mask)?;
-        Ok(self.matches.constraints(&self.criteria(settings), mask))
+        let terms = Terms {
+            criteria: self.criteria(settings),
+            softness: settings.softness,
+            smoothness_length: self.smoothness_length(settings),
+            fill: &self.fill,
+        };
+        Ok(self.matches.constraints(&terms, mask))
+    }
+
+    /// l in world units. The paper's share refers to the source's bounding box, that of confidence to its extent, which no
+    /// rotation changes.
+    pub(super) fn smoothness_length(&self, settings: &Settings) -> f64 {
+        settings.smoothness_length.of(match settings.method {
+            MatchMethod::ClosestPoint => self.source.diagonal(),
+            MatchMethod::Confidence => self.source.size(),
+        })
     }
 
     pub(super) fn criteria(&self, settings: &Settings) -> Criteria {
@@ -223,6 +251,14 @@ impl Inpainting {
         smooth::smooth(weights, laplacian, &region, settings.smoothing_iterations, settings.smoothing_factor)
     }
 
+    fn stiffen(&self, weights: Weights, settings: &Settings) -> (Weights, usize) {
+        if !settings.stiffens() {
+            return (weights, 0);
+        }
+        let gaps: Vec<f64> = self.matches.points().iter().map(|point| point.distance).collect();
+        small_islands::stiffen(weights, &self.fill, &gaps, self.source.size())
+    }
+
     fn scene<'a>(&'a self, problem: &'a Problem) -> Scene<'a> {
         Scene {
             source: &self.source,
@@ -235,8 +271,8 @@ impl Inpainting {
     }
 }
 
-fn matched(constraints: &[Constraint]) -> Vec<bool> {
-    constraints.iter().map(|&known| known == Constraint::Fixed).collect()
+fn trusted(confidence: &[f32]) -> Vec<bool> {
+    confidence.iter().map(|&confidence| confidence >= 0.5).collect()
 }
 
 fn count(flags: &[bool]) -> usize {

@@ -29,7 +29,7 @@ impl Problem {
         if !has_match.contains(&true) {
             return Err(nothing_matched(target, &criteria, mask, settings));
         }
-        let smoothness_length = settings.smoothness_length.of(target.source.diagonal());
+        let smoothness_length = target.smoothness_length(settings);
         Ok(Self { criteria, smoothness_length, constraints, has_match })
     }
 }

@@ -22,6 +22,8 @@ pub struct Report {
     pub islands: usize,
     /// Islands without a match and what became of them.
     pub unmatched_islands: Vec<UnmatchedIsland>,
+    /// Small loose islands that were made rigid.
+    pub rigid_islands: usize,
     /// Independent blocks of the system, and how many of them had to be factored.
     pub blocks: usize,
     /// See `blocks`.

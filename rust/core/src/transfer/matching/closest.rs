@@ -18,6 +18,11 @@ pub struct Criteria {
 }
 
 impl Criteria {
+    /// Whether distance and angle of vertex `i` are within the thresholds.
+    pub(super) fn accepts(&self, matches: &Matches, i: usize) -> bool {
+        matches.points()[i].distance <= self.max_distance && self.accepts_angle(matches.angles[i])
+    }
+
     /// Whether normals at this angle agree; NaN never does.
     fn accepts_angle(&self, angle: f32) -> bool {
         let angle = f64::from(angle);
@@ -36,10 +41,7 @@ pub(super) fn constraints(matches: &Matches, criteria: &Criteria, mask: Option<&
     let is_matched = |i: usize| match mask.map_or(MaskValue::Automatic, |mask| mask[i]) {
         MaskValue::Inpaint => false,
         MaskValue::ForceMatch => matches.weighted[i],
-        MaskValue::Automatic => {
-            let near = matches.points()[i].distance <= criteria.max_distance;
-            matches.weighted[i] && near && criteria.accepts_angle(matches.angles[i])
-        }
+        MaskValue::Automatic => matches.weighted[i] && criteria.accepts(matches, i),
     };
     let constraint = |i| if is_matched(i) { Constraint::Fixed } else { Constraint::Free };
     (0..matches.points().len()).into_par_iter().with_min_len(1024).map(constraint).collect()

@@ -6,6 +6,7 @@
 
 mod candidates;
 mod closest;
+mod confidence;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,7 +15,7 @@ pub use candidates::Candidates;
 pub use closest::Criteria;
 
 use super::Source;
-use crate::fill::{Constraint, Row};
+use crate::fill::{Constraint, Fill, Row};
 use crate::surface::SurfacePoint;
 
 /// How matching points are found and trusted.
@@ -24,11 +25,13 @@ pub enum MatchMethod {
     /// method.
     #[default]
     ClosestPoint,
+    /// The point nearest in position and direction, trusted over a length that grows with gap and tilt, with no threshold.
+    Confidence,
 }
 
 impl MatchMethod {
     /// All methods, for tests and menus.
-    pub const ALL: [Self; 1] = [Self::ClosestPoint];
+    pub const ALL: [Self; 2] = [Self::ClosestPoint, Self::Confidence];
 }
 
 /// What the artist asks of one vertex.
@@ -52,11 +55,26 @@ pub struct TargetSurface<'a> {
     pub normals: &'a [Vec3],
 }
 
+/// What makes constraints of points, besides the mask.
+#[derive(Debug, Clone, Copy)]
+pub struct Terms<'a> {
+    /// The paper's thresholds.
+    pub criteria: Criteria,
+    /// Lengths of trust as multiples of gaps.
+    pub softness: f64,
+    /// l of the energy, world units.
+    pub smoothness_length: f64,
+    /// The target's areas, edges and islands.
+    pub fill: &'a Fill,
+}
+
 /// The points of all vertices, found once.
 #[derive(Debug)]
 pub struct Matches {
     method: MatchMethod,
     candidates: Candidates,
+    trust: confidence::Trust,
+    source_size: f64,
     /// Angle between the target's normal and that of the first candidate (V), radians in [0, pi], NaN where one has no length.
     angles: Vec<f32>,
     /// Whether the source has any weight at the candidates (V).
@@ -66,20 +84,34 @@ pub struct Matches {
 impl Matches {
     /// Finds the points of all vertices of `target` on `source`.
     pub fn find(method: MatchMethod, source: &Source, target: TargetSurface<'_>) -> Self {
-        let candidates = match method {
-            MatchMethod::ClosestPoint => closest::find(source, target),
+        let (candidates, trust) = match method {
+            MatchMethod::ClosestPoint => (closest::find(source, target), confidence::Trust::default()),
+            MatchMethod::Confidence => confidence::find(source, target),
         };
         let points = candidates.first_points().par_iter().with_min_len(1024);
         let angles = points.zip(target.normals).map(|(point, &normal)| angle(source, point, normal)).collect();
         let weighted = candidates.weighted(source);
-        Self { method, candidates, angles, weighted }
+        Self { method, candidates, trust, source_size: source.size(), angles, weighted }
     }
 
-    /// What `criteria` and the artist's `mask` (V, automatic everywhere if absent) make of the points, (V).
-    pub fn constraints(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
+    /// What `terms` and the artist's `mask` (V, automatic everywhere if absent) make of the points, (V).
+    pub fn constraints(&self, terms: &Terms<'_>, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
         match self.method {
-            MatchMethod::ClosestPoint => closest::constraints(self, criteria, mask),
+            MatchMethod::ClosestPoint => closest::constraints(self, &terms.criteria, mask),
+            MatchMethod::Confidence => confidence::constraints(self, terms, mask),
         }
+    }
+
+    /// How far each vertex's row is trusted, 0 to 1, given the `constraints` that were made of it (V): all or nothing with
+    /// the paper's method, and where the mask decides.
+    pub fn confidence(&self, constraints: &[Constraint], softness: f64, mask: Option<&[MaskValue]>) -> Vec<f32> {
+        let lengths = self.trust.lengths(softness, self.source_size);
+        let is_automatic = |i: usize| mask.is_none_or(|mask| mask[i] == MaskValue::Automatic);
+        let confidence = |(i, known): (usize, &Constraint)| match lengths.get(i) {
+            Some(&length) if known.is_known() && is_automatic(i) => confidence::confidence(length, self.source_size),
+            _ => f32::from(u8::from(known.is_known())),
+        };
+        constraints.iter().enumerate().map(confidence).collect()
     }
 
     /// The method that found them.
@@ -102,15 +134,20 @@ impl Matches {
         self.weighted = self.candidates.weighted(source);
     }
 
-    /// Appends the weights that vertex `i` takes from the source to `row`: normalised, in bone order.
-    pub fn append_row(&self, source: &Source, i: u32, row: &mut Row) {
-        self.candidates.append_row(source, i as usize, row);
+    /// Appends the weights that vertex `i` takes from the source to `row`: normalised, in bone order. A vertex that the
+    /// mask forces takes those of its closest point.
+    pub fn append_row(&self, source: &Source, mask: Option<&[MaskValue]>, i: u32, row: &mut Row) {
+        if mask.is_some_and(|mask| mask[i as usize] == MaskValue::ForceMatch) {
+            source.blend(&self.points()[i as usize], row);
+        } else {
+            self.candidates.append_row(source, i as usize, row);
+        }
     }
 
     /// The smallest distance at which some vertex would match, were the largest one that large.
     pub fn smallest_matching_distance(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Option<f64> {
         let any_distance = Criteria { max_distance: f64::INFINITY, ..*criteria };
-        let possible = self.constraints(&any_distance, mask);
+        let possible = closest::constraints(self, &any_distance, mask);
         let distances = std::iter::zip(self.points(), possible).filter(|(_, known)| *known != Constraint::Free);
         distances.map(|(point, _)| point.distance).min_by(f64::total_cmp)
     }
