@@ -71,7 +71,7 @@ class Surface:
         return np.sqrt(np.maximum(squared, 0)), faces, shares / shares.sum(axis=1, keepdims=True), found
 
     def height(self, points: np.ndarray) -> np.ndarray:
-        """How far outside the surface each point lies (V), negative inside, by the blended normal at its closest point."""
+        """How far outside the surface each point lies (V), negative inside, by the normal at its closest point."""
         _, faces, shares, found = self.closest(points)
         normals = np.einsum("vk,vki->vi", shares, self.normals[self.triangles[faces]])
         return np.einsum("vi,vi->v", points - found, normals)

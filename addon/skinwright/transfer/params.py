@@ -49,9 +49,9 @@ class TransferParams:
     def native(self) -> dict[str, Any]:
         """The keyword arguments of the native transfer; the mask is the caller's."""
         names = (
-            "method softness max_distance relative_max_distance max_normal_angle match_flipped_normals smoothness_length "
-            "relative_smoothness_length smoothing_iterations smoothing_factor max_influences island_policy small_islands "
-            "threads"
+            "method softness max_distance relative_max_distance max_normal_angle match_flipped_normals "
+            "smoothness_length relative_smoothness_length smoothing_iterations smoothing_factor max_influences "
+            "island_policy small_islands threads"
         )
         return {name: getattr(self, name) for name in names.split()}
 

@@ -6,6 +6,7 @@
 //! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used
 //! again.
 
+mod detail;
 mod islands;
 pub mod limit;
 pub mod matching;

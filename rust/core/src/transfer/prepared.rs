@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::detail::Detail;
 use super::islands::Scene;
 use super::matching::{Matches, TargetSurface, Terms};
 use super::problem::Problem;
@@ -15,6 +16,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::surface::SurfacePoint;
 use crate::weights::Weights;
+
+/// l of confidence relative to that of the paper's method.
+const LONGER: f64 = 2.0;
 
 /// A target prepared for solving again and again.
 ///
@@ -125,7 +129,8 @@ impl Inpainting {
         progress.report(0.7);
         progress.check()?;
         stages.end("factor");
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
+        let detail = self.detail(&problem, mask);
+        let given = |i: u32, row: &mut Row| self.append_given(detail.as_ref(), mask, i, row);
         let filled = self.fill.solve(&given, progress)?;
         stages.end("solve");
         let weights = self.gather(&filled);
@@ -171,9 +176,10 @@ impl Inpainting {
         self.prepare_for(settings.method);
         let progress = Progress::default();
         let problem = Problem::new(self, mask, settings)?;
-        let assembled = self.fill.assemble(problem.constraints, problem.smoothness_length, &progress)?;
+        let assembled = self.fill.assemble(problem.constraints.clone(), problem.smoothness_length, &progress)?;
         self.fill.factor(assembled, &progress)?;
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
+        let detail = self.detail(&problem, mask);
+        let given = |i: u32, row: &mut Row| self.append_given(detail.as_ref(), mask, i, row);
         let filled = self.fill.solve(&given, &progress)?;
         let unknown = self.fill.unknown();
         let vertices: Vec<u32> = (0..unknown.len() as u32).filter(|&i| unknown[i as usize]).collect();
@@ -186,6 +192,21 @@ impl Inpainting {
             row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
         }
         Ok(RawWeights { vertices, values })
+    }
+
+    /// What keeps the source's detail where rows are soft; the paper's method has no such rows.
+    fn detail(&self, problem: &Problem, mask: Option<&[MaskValue]>) -> Option<Detail> {
+        let (length, constraints) = (problem.smoothness_length, &problem.constraints);
+        let rows = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
+        (self.matches.method() == MatchMethod::Confidence)
+            .then(|| Detail::new(&self.source, &self.matches, &self.fill, constraints, length, rows))
+    }
+
+    fn append_given(&self, detail: Option<&Detail>, mask: Option<&[MaskValue]>, i: u32, row: &mut Row) {
+        match detail.map(|detail| detail.row(i)) {
+            Some(pulled) if !pulled.is_empty() => row.extend(pulled),
+            _ => self.matches.append_row(&self.source, mask, i, row),
+        }
     }
 
     /// Finds the points of another method, if it is another.
@@ -209,11 +230,11 @@ impl Inpainting {
     }
 
     /// l in world units. The paper's share refers to the source's bounding box, that of confidence to its extent, which no
-    /// rotation changes.
+    /// rotation changes; where every vertex has a row a longer l does not overshoot, and smooths better.
     pub(super) fn smoothness_length(&self, settings: &Settings) -> f64 {
         settings.smoothness_length.of(match settings.method {
             MatchMethod::ClosestPoint => self.source.diagonal(),
-            MatchMethod::Confidence => self.source.size(),
+            MatchMethod::Confidence => LONGER * self.source.size(),
         })
     }
 

@@ -18,6 +18,7 @@ pub struct Source {
 
 #[derive(Debug)]
 struct Geometry {
+    positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     index: SurfaceIndex,
     normals: Vec<Vec3>,
@@ -44,7 +45,7 @@ impl Source {
         let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), || mesh.vertex_normals());
         let diagonal = mesh.diagonal();
         let (areas, size) = (areas(&mesh), size(&mesh));
-        let geometry = Geometry { index, normals, diagonal, size, areas, triangles };
+        let geometry = Geometry { positions: positions.to_vec(), index, normals, diagonal, size, areas, triangles };
         Ok(Self { geometry: Arc::new(geometry), weights: Arc::new(weights) })
     }
 
@@ -81,6 +82,13 @@ impl Source {
     /// Within 8 % of the bounding box's diagonal for a person, but no rotation changes it.
     pub fn size(&self) -> f64 {
         self.geometry.size
+    }
+
+    /// World position of a point of the surface.
+    pub fn position(&self, point: &SurfacePoint) -> DVec3 {
+        let corners = self.geometry.triangles[point.triangle as usize];
+        let corner = |i: u32| Vec3::from(self.geometry.positions[i as usize]).as_dvec3();
+        std::iter::zip(corners, point.barycentric).map(|(i, share)| corner(i) * share).sum()
     }
 
     /// Area of triangle `t`.

@@ -42,16 +42,17 @@ const HALF_TRUSTED: f64 = 0.02;
 #[derive(Debug, Default)]
 pub(super) struct Trust {
     /// Distance to the point that was chosen, world units.
-    gap: Vec<f64>,
-    /// Gap and tilt together: what softness is multiplied by, world units.
-    growth: Vec<f64>,
+    pub gap: Vec<f64>,
+    /// Cosine between the normals there.
+    pub cosine: Vec<f64>,
 }
 
 impl Trust {
     /// Lengths h over which the rows are trusted, world units (V).
     pub fn lengths(&self, softness: f64, size: f64) -> Vec<f64> {
         let floor = |gap: f64| (FLOOR * size).min(gap / 2.0) + EQUALLY_NEAR * size;
-        std::iter::zip(&self.gap, &self.growth).map(|(&gap, &growth)| softness * growth + floor(gap)).collect()
+        let length = |(&gap, &cosine): (&f64, &f64)| softness * growth(gap, cosine) + floor(gap);
+        std::iter::zip(&self.gap, &self.cosine).map(length).collect()
     }
 }
 
@@ -74,22 +75,21 @@ pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, T
     let cost = |i: usize, point: &SurfacePoint| cost(point.distance, cosine(source, point, target.normals[i]), size);
     let bound = |(i, point): (usize, &SurfacePoint)| {
         let own = cost(i, point);
-        // Nothing cheaper lies outside the ball of this radius.
-        let may_move = own.sqrt() - point.distance > 1e-3 * DIRECTION * size;
         let near = point.distance + EQUALLY_NEAR * size;
-        Bound { near: near * near, cost: if may_move { SLACK * HYSTERESIS * own } else { 0.0 } }
+        let cost = if may_move(own, point.distance, size) { SLACK * HYSTERESIS * own } else { 0.0 };
+        Bound { near: near * near, cost }
     };
     let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
     let finish = |i: usize, found: &[Priced]| {
         let priced: Vec<(Priced, f64)> =
             found.iter().map(|&p| (p, cosine(source, &p.point, target.normals[i]).unwrap_or(1.0))).collect();
-        choose(source, &priced, bounds[i].near, size)
+        choose(source, &priced, closest[i].distance, size)
     };
     let choices = source.index().cheapest_points(target.positions, &bounds, SLACK, cost, finish);
     let gap: Vec<f64> = choices.iter().map(|choice| choice.gap).collect();
-    let growth = choices.iter().map(|choice| growth(choice.gap, choice.cosine)).collect();
+    let cosine = choices.iter().map(|choice| choice.cosine).collect();
     let all: Vec<_> = choices.into_iter().map(|choice| choice.points).collect();
-    (Candidates::several(closest, &all), Trust { gap, growth })
+    (Candidates::several(closest, &all), Trust { gap, cosine })
 }
 
 /// Cost of a point at a distance whose normal has a cosine with the vertex's; without a normal only distance counts.
@@ -109,14 +109,21 @@ fn cosine(source: &Source, point: &SurfacePoint, normal: Vec3) -> Option<f64> {
     (lengths > 0.0).then(|| (blend.dot(normal) / lengths).clamp(-1.0, 1.0))
 }
 
+/// Whether a cost leaves room for a cheaper point: none lies outside the ball whose radius is its root, and within `distance`
+/// there is nothing at all.
+fn may_move(cost: f64, distance: f64, size: f64) -> bool {
+    cost.sqrt() - distance > 1e-3 * DIRECTION * size
+}
+
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
-fn choose(source: &Source, found: &[(Priced, f64)], near: f64, size: f64) -> Choice {
+fn choose(source: &Source, found: &[(Priced, f64)], distance: f64, size: f64) -> Choice {
+    let near = (distance + EQUALLY_NEAR * size).powi(2);
     let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
     let least = |among: &dyn Fn(&Priced) -> bool| {
         found.iter().filter(|(p, _)| among(p)).map(|(p, _)| p.cost).fold(f64::INFINITY, f64::min)
     };
     let (least_near, least_of_all) = (least(&is_near), least(&|_| true));
-    let moves = least_of_all < HYSTERESIS * least_near;
+    let moves = may_move(least_near, distance, size) && least_of_all < HYSTERESIS * least_near;
     let best = if moves { least_of_all } else { least_near };
     let smallest = (EQUALLY_NEAR * size).powi(2);
     let tied = found.iter().filter(|(p, _)| (moves || is_near(p)) && p.cost <= SLACK * best + smallest);
@@ -148,7 +155,7 @@ fn are_one(source: &Source, first: &SurfacePoint, second: &SurfacePoint) -> bool
     first.len() == second.len() && std::iter::zip(first, second).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-6)
 }
 
-/// Gap and tilt as one length. Normals that point the opposite way are those of linings, and no tilt.
+/// Gap and tilt as one length, which softness multiplies. Normals that point the opposite way are those of linings, and no tilt.
 fn growth(gap: f64, cosine: f64) -> f64 {
     let cosine = cosine.abs().max(LEAST_COSINE);
     gap * (GAP + TILT * (1.0 / (cosine * cosine) - 1.0))

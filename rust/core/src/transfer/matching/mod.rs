@@ -144,6 +144,16 @@ impl Matches {
         }
     }
 
+    /// Mean of the points on the source that vertex `i` takes its row from, world space.
+    pub(super) fn mean_position(&self, source: &Source, i: usize) -> DVec3 {
+        self.candidates.mean_position(source, i)
+    }
+
+    /// Distance to them, and the cosine between the normals; only [`MatchMethod::Confidence`] keeps them.
+    pub(super) fn gap_and_cosine(&self, i: usize) -> (f64, f64) {
+        (self.trust.gap[i], self.trust.cosine[i])
+    }
+
     /// The smallest distance at which some vertex would match, were the largest one that large.
     pub fn smallest_matching_distance(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Option<f64> {
         let any_distance = Criteria { max_distance: f64::INFINITY, ..*criteria };

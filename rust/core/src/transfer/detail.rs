@@ -1,0 +1,133 @@
+//! Detail of the source's weights that a garment keeps even where it is smoothed.
+//!
+//! Smoothing over the width of a gap would blur the sharp changes at elbows and knees as well. Where two neighbours' points lie
+//! on the source as the neighbours themselves lie to each other, the change of weight between them is the source's own and is
+//! kept; where the points lie apart, as on two legs, or the surfaces tilt, the change is an accident of matching and is not.
+//! With t the trust in an edge and `S_t` the stiffness whose edges are scaled by it, the energy's gradient is
+//! `(S + l^2 S M^-1 S) W + b (W - W0) = (1 + l^2 S M^-1) S_t W0`: gradient-domain blending (Pérez, Gangnet, Blake, *Poisson
+//! Image Editing*, SIGGRAPH 2003, doi 10.1145/882262.882269) with the source's weights as guidance.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Source;
+use super::matching::Matches;
+use crate::fill::{Constraint, Fill, Row};
+
+/// Share of a trusted change that is kept at most; all of it would keep more torn edges as well.
+const KEPT: f64 = 0.85;
+/// Stretch of an edge on the source, beyond its own length, at which its change is trusted by half.
+const STRETCH: f64 = 0.5;
+/// Power of the cosine between the normals.
+const TILT: i32 = 4;
+/// Gap, as a share of the source's size, at which it is trusted by half.
+const GAP: f64 = 0.05;
+
+/// What a vertex's point says of the edges around it.
+struct Place {
+    /// On the source, world space.
+    point: DVec3,
+    gap: f64,
+    cosine: f64,
+}
+
+impl Place {
+    /// Trust, 0 to 1, in the change of weight along an edge of this `length` between two vertices.
+    fn trust(&self, other: &Self, length: f64, source_size: f64) -> f64 {
+        let stretch = self.point.distance(other.point) / length.max(f64::MIN_POSITIVE);
+        let excess = ((stretch - 1.0).max(0.0) / STRETCH).powi(2);
+        let gap = (self.gap.max(other.gap) / (GAP * source_size)).powi(4);
+        KEPT * self.cosine.min(other.cosine).powi(TILT) / ((1.0 + excess) * (1.0 + gap))
+    }
+}
+
+/// The rows that soft vertices are pulled towards, so that detail is kept: `W0 + (1 + l^2 S M^-1) S_t W0 / b`.
+#[derive(Debug)]
+pub(super) struct Detail {
+    rows: Vec<Row>,
+}
+
+impl Detail {
+    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are soft, `length` is l.
+    pub fn new(
+        source: &Source,
+        matches: &Matches,
+        fill: &Fill,
+        constraints: &[Constraint],
+        length: f64,
+        rows: impl Fn(u32, &mut Row) + Sync,
+    ) -> Self {
+        let n = constraints.len();
+        let own = collect(n, |i, row| {
+            if constraints[i].is_known() {
+                rows(i as u32, row)
+            }
+        });
+        let guidance = guidance(source, matches, fill, &own);
+        let laplacian = fill.laplacian();
+        let pulled = |i: usize, row: &mut Row| {
+            let Constraint::Soft(confidence) = constraints[i] else { return };
+            let scale = |j: usize, s_ij: f64| length * length * s_ij / (laplacian.mass(j) * confidence);
+            append_scaled(row, &own[i], 1.0);
+            append_scaled(row, &guidance[i], 1.0 / confidence + scale(i, laplacian.diagonal(i)));
+            for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
+                append_scaled(row, &guidance[j as usize], scale(j as usize, -cotangent));
+            }
+            add_up(row);
+        };
+        Self { rows: collect(n, pulled) }
+    }
+
+    /// The row that soft vertex `i` is pulled towards, empty for the others.
+    pub fn row(&self, i: u32) -> &Row {
+        &self.rows[i as usize]
+    }
+}
+
+/// `S_t W0`, a row for each vertex; edges to vertices without a row count for nothing.
+fn guidance(source: &Source, matches: &Matches, fill: &Fill, own: &[Row]) -> Vec<Row> {
+    let place = |i: usize| {
+        let (point, (gap, cosine)) = (matches.mean_position(source, i), matches.gap_and_cosine(i));
+        Place { point, gap, cosine: cosine.abs() }
+    };
+    let places: Vec<Place> = (0..own.len()).into_par_iter().with_min_len(512).map(place).collect();
+    let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
+    collect(own.len(), |i, row| {
+        for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
+            let (here, there) = (&own[i], &own[j as usize]);
+            if here == there || here.is_empty() || there.is_empty() {
+                continue;
+            }
+            let length = mesh.position(i as u32).distance(mesh.position(j));
+            let weight = cotangent * places[i].trust(&places[j as usize], length, source.size());
+            append_scaled(row, here, weight);
+            append_scaled(row, there, -weight);
+        }
+        add_up(row);
+    })
+}
+
+fn collect(n: usize, append: impl Fn(usize, &mut Row) + Sync) -> Vec<Row> {
+    let one = |i| {
+        let mut row = Row::new();
+        append(i, &mut row);
+        row
+    };
+    (0..n).into_par_iter().with_min_len(256).map(one).collect()
+}
+
+fn append_scaled(row: &mut Row, other: &Row, factor: f64) {
+    row.extend(other.iter().map(|&(column, value)| (column, factor * value)));
+}
+
+/// Sorts by column and adds up equal ones; the sort is stable, so that the sum does not depend on chance.
+fn add_up(row: &mut Row) {
+    row.sort_by_key(|&(column, _)| column);
+    row.dedup_by(|next, kept| {
+        let equal = next.0 == kept.0;
+        if equal {
+            kept.1 += next.1;
+        }
+        equal
+    });
+}
