@@ -196,7 +196,8 @@ def test_small_loose_parts_become_rigid(method):
     source, _ = tubes()
     prepared = native_source(*source)
     loose, on_skin = small_part(source, 0.02), small_part(source, 0.0)
-    rows = lambda part, choice: dense(prepared.transfer(*part, method=method, small_islands=choice))  # noqa: E731
+    settings = {"method": method, "relative_max_distance": 1.0, "max_normal_angle": 3.2}
+    rows = lambda part, choice: dense(prepared.transfer(*part, small_islands=choice, **settings))  # noqa: E731
     assert np.ptp(rows(loose, "rigid"), axis=0).max() < 1e-6
     assert np.ptp(rows(loose, "solved"), axis=0).max() > 0.01
     assert np.ptp(rows(on_skin, "rigid"), axis=0).max() > 0.01
@@ -204,10 +205,18 @@ def test_small_loose_parts_become_rigid(method):
     assert (by_itself < 1e-6) == (method == "confidence")
 
 
+def test_a_garment_far_away_still_gets_rows():
+    """There is no threshold that could leave all of it without any."""
+    source, (cloth, faces) = tubes()
+    answer = native_source(*source).transfer(cloth + (0, 3, 0), faces, method="confidence")
+    assert answer.report["unmatched_islands"] == []
+    np.testing.assert_allclose(dense(answer).sum(axis=1), 1, atol=1e-6)
+
+
 def test_unknown_names_are_refused():
     source, target = tubes()
     prepared = native_source(*source)
-    with pytest.raises(native.SkinwrightError, match="method is 'nearest', but must be one of paper, confidence"):
+    with pytest.raises(native.SkinwrightError, match='method is "nearest", but must be one of paper, confidence'):
         prepared.transfer(*target, method="nearest")
     with pytest.raises(native.SkinwrightError, match="softness"):
         prepared.transfer(*target, method="confidence", softness=0.0)

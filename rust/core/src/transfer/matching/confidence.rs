@@ -34,7 +34,7 @@ const TILT: f64 = 3.0;
 const LEAST_COSINE: f64 = 0.05;
 /// A vertex is held at its row if it is trusted over less than this share of its shortest edge: smoothing over so little
 /// changes nothing that the mesh can show.
-const HELD: f64 = 0.25;
+const HELD: f64 = 0.5;
 /// Length, as a share of the source's size, at which a vertex is trusted by half.
 const HALF_TRUSTED: f64 = 0.02;
 
@@ -109,10 +109,10 @@ fn cosine(source: &Source, point: &SurfacePoint, normal: Vec3) -> Option<f64> {
     (lengths > 0.0).then(|| (blend.dot(normal) / lengths).clamp(-1.0, 1.0))
 }
 
-/// Whether a cost leaves room for a cheaper point: none lies outside the ball whose radius is its root, and within `distance`
-/// there is nothing at all.
+/// Whether a point with this cost can be left: no other costs less than the squared distance of the closest one. Nothing is
+/// gained on the skin itself, where both are rounding errors.
 fn may_move(cost: f64, distance: f64, size: f64) -> bool {
-    cost.sqrt() - distance > 1e-3 * DIRECTION * size
+    HYSTERESIS * cost > distance * distance && cost.sqrt() - distance > 1e-3 * DIRECTION * size
 }
 
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
@@ -179,7 +179,8 @@ pub(super) fn constraints(matches: &Matches, terms: &Terms<'_>, mask: Option<&[M
     (0..lengths.len()).into_par_iter().with_min_len(1024).map(constraint).collect()
 }
 
-/// Which islands have a vertex that the paper would match, or that the mask forces.
+/// Which islands have a vertex that the paper would match, or that the mask forces; all of them if none has, for then there is
+/// nothing to hang on.
 fn reached_islands(matches: &Matches, terms: &Terms<'_>, mask: Option<&[MaskValue]>) -> Vec<bool> {
     let mut reached = vec![false; terms.fill.islands().count()];
     for (i, &island) in terms.fill.islands().of_vertex().iter().enumerate().filter(|&(_, &island)| island != NONE) {
@@ -187,6 +188,9 @@ fn reached_islands(matches: &Matches, terms: &Terms<'_>, mask: Option<&[MaskValu
         if !reached[island as usize] && matches.weighted[i] && (forced || terms.criteria.accepts(matches, i)) {
             reached[island as usize] = true;
         }
+    }
+    if !reached.contains(&true) {
+        reached.fill(true);
     }
     reached
 }
