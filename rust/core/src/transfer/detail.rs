@@ -3,9 +3,9 @@
 //! Smoothing over the width of a gap would blur the sharp changes at elbows and knees as well. Where two neighbours' points lie
 //! on the source as the neighbours themselves lie to each other, the change of weight between them is the source's own and is
 //! kept; where the points lie apart, as on two legs, or the surfaces tilt, the change is an accident of matching and is not.
-//! With t the trust in an edge and `S_t` the stiffness whose edges are scaled by it, the energy's gradient is
-//! `(S + l^2 S M^-1 S) W + b (W - W0) = (1 + l^2 S M^-1) S_t W0`: gradient-domain blending (Pérez, Gangnet, Blake, *Poisson
-//! Image Editing*, SIGGRAPH 2003, doi 10.1145/882262.882269) with the source's weights as guidance.
+//! With t the trust in an edge and `S_t` the stiffness whose edges are scaled by it, what is solved is
+//! `S W + b (W - W0) = S_t W0`: gradient-domain blending (Pérez, Gangnet, Blake, *Poisson Image Editing*, SIGGRAPH 2003,
+//! doi 10.1145/882262.882269) with the source's weights as guidance.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -41,51 +41,40 @@ impl Place {
     }
 }
 
-/// The rows that soft vertices are pulled towards, so that detail is kept: `W0 + (1 + l^2 S M^-1) S_t W0 / b`.
+/// What is added to the rows that soft vertices are pulled towards, so that detail is kept: `S_t W0 / b`.
 #[derive(Debug)]
 pub(super) struct Detail {
     rows: Vec<Row>,
 }
 
 impl Detail {
-    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are soft, `length` is l.
+    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are soft.
     pub fn new(
         source: &Source,
         matches: &Matches,
         fill: &Fill,
         constraints: &[Constraint],
-        length: f64,
         rows: impl Fn(u32, &mut Row) + Sync,
     ) -> Self {
-        let n = constraints.len();
-        let own = collect(n, |i, row| {
+        let own = collect(constraints.len(), |i, row| {
             if constraints[i].is_known() {
                 rows(i as u32, row)
             }
         });
-        let guidance = guidance(source, matches, fill, &own);
-        let laplacian = fill.laplacian();
-        let pulled = |i: usize, row: &mut Row| {
-            let Constraint::Soft(confidence) = constraints[i] else { return };
-            let scale = |j: usize, s_ij: f64| length * length * s_ij / (laplacian.mass(j) * confidence);
-            append_scaled(row, &own[i], 1.0);
-            append_scaled(row, &guidance[i], 1.0 / confidence + scale(i, laplacian.diagonal(i)));
-            for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
-                append_scaled(row, &guidance[j as usize], scale(j as usize, -cotangent));
-            }
-            add_up(row);
-        };
-        Self { rows: collect(n, pulled) }
+        Self { rows: guidance(source, matches, fill, constraints, &own) }
     }
 
-    /// The row that soft vertex `i` is pulled towards, empty for the others.
-    pub fn row(&self, i: u32) -> &Row {
-        &self.rows[i as usize]
+    /// Adds it to the row of vertex `i`, which is sorted by column.
+    pub fn add_to(&self, i: u32, row: &mut Row) {
+        if !self.rows[i as usize].is_empty() {
+            row.extend(&self.rows[i as usize]);
+            add_up(row);
+        }
     }
 }
 
-/// `S_t W0`, a row for each vertex; edges to vertices without a row count for nothing.
-fn guidance(source: &Source, matches: &Matches, fill: &Fill, own: &[Row]) -> Vec<Row> {
+/// `S_t W0 / b`, a row for each soft vertex; edges to vertices without a row count for nothing.
+fn guidance(source: &Source, matches: &Matches, fill: &Fill, constraints: &[Constraint], own: &[Row]) -> Vec<Row> {
     let place = |i: usize| {
         let (point, (gap, cosine)) = (matches.mean_position(source, i), matches.gap_and_cosine(i));
         Place { point, gap, cosine: cosine.abs() }
@@ -93,13 +82,14 @@ fn guidance(source: &Source, matches: &Matches, fill: &Fill, own: &[Row]) -> Vec
     let places: Vec<Place> = (0..own.len()).into_par_iter().with_min_len(512).map(place).collect();
     let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
     collect(own.len(), |i, row| {
+        let Constraint::Soft(confidence) = constraints[i] else { return };
         for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
             let (here, there) = (&own[i], &own[j as usize]);
             if here == there || here.is_empty() || there.is_empty() {
                 continue;
             }
             let length = mesh.position(i as u32).distance(mesh.position(j));
-            let weight = cotangent * places[i].trust(&places[j as usize], length, source.size());
+            let weight = cotangent * places[i].trust(&places[j as usize], length, source.size()) / confidence;
             append_scaled(row, here, weight);
             append_scaled(row, there, -weight);
         }

@@ -17,9 +17,6 @@ use crate::progress::Progress;
 use crate::surface::SurfacePoint;
 use crate::weights::Weights;
 
-/// l of confidence relative to that of the paper's method.
-const LONGER: f64 = 2.0;
-
 /// A target prepared for solving again and again.
 ///
 /// Points on the source are found once for each [`MatchMethod`]. A block is factored again only when its unknowns, their
@@ -41,6 +38,15 @@ pub struct RawWeights {
     pub vertices: Vec<u32>,
     /// Weights, (U, bones) row-major.
     pub values: Vec<f64>,
+}
+
+/// What a solve leaves behind.
+struct Solved {
+    weights: Weights,
+    inpainted: usize,
+    blocks: usize,
+    minimum: f64,
+    residual: f64,
 }
 
 impl Inpainting {
@@ -129,12 +135,16 @@ impl Inpainting {
         progress.report(0.7);
         progress.check()?;
         stages.end("factor");
-        let detail = self.detail(&problem, mask);
-        let given = |i: u32, row: &mut Row| self.append_given(detail.as_ref(), mask, i, row);
-        let filled = self.fill.solve(&given, progress)?;
+        let solved = self.solved(&problem, mask, progress, |filled| Solved {
+            weights: self.gather(filled),
+            inpainted: count(self.fill.unknown()),
+            blocks: self.fill.block_count(),
+            minimum: filled.minimum(),
+            residual: filled.largest_residual(),
+        })?;
         stages.end("solve");
-        let weights = self.gather(&filled);
-        stages.end("gather");
+        let weights = self.inpaint_masked(solved.weights, &problem, mask, settings, progress)?;
+        stages.end("inpaint");
         let weights = self.smooth(weights, &problem, settings);
         stages.end("smooth");
         progress.check()?;
@@ -153,14 +163,14 @@ impl Inpainting {
             source_unweighted,
             source_unnormalised,
             matched: count(&matched),
-            inpainted: count(self.fill.unknown()),
+            inpainted: solved.inpainted,
             loose: self.islands().of_vertex().iter().filter(|&&island| island == NONE).count(),
             islands: self.islands().count(),
-            blocks: self.fill.block_count(),
+            blocks: solved.blocks,
             max_distance: problem.criteria.max_distance,
             smoothness_length: problem.smoothness_length,
-            raw_minimum: filled.minimum(),
-            largest_residual: filled.largest_residual(),
+            raw_minimum: solved.minimum,
+            largest_residual: solved.residual,
             seconds: self.preparation.iter().copied().chain(stages.into_seconds()).collect(),
             ..Report::of_weights(&weights)
         };
@@ -178,35 +188,75 @@ impl Inpainting {
         let problem = Problem::new(self, mask, settings)?;
         let assembled = self.fill.assemble(problem.constraints.clone(), problem.smoothness_length, &progress)?;
         self.fill.factor(assembled, &progress)?;
-        let detail = self.detail(&problem, mask);
-        let given = |i: u32, row: &mut Row| self.append_given(detail.as_ref(), mask, i, row);
-        let filled = self.fill.solve(&given, &progress)?;
         let unknown = self.fill.unknown();
         let vertices: Vec<u32> = (0..unknown.len() as u32).filter(|&i| unknown[i as usize]).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
-        let mut row = Row::new();
-        for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
-            row.clear();
-            filled.append_row(i as usize, &mut row);
-            row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
-        }
+        self.solved(&problem, mask, &progress, |filled| {
+            let mut row = Row::new();
+            for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
+                row.clear();
+                filled.append_row(i as usize, &mut row);
+                row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
+            }
+        })?;
         Ok(RawWeights { vertices, values })
     }
 
-    /// What keeps the source's detail where rows are soft; the paper's method has no such rows.
-    fn detail(&self, problem: &Problem, mask: Option<&[MaskValue]>) -> Option<Detail> {
-        let (length, constraints) = (problem.smoothness_length, &problem.constraints);
-        let rows = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
-        (self.matches.method() == MatchMethod::Confidence)
-            .then(|| Detail::new(&self.source, &self.matches, &self.fill, constraints, length, rows))
+    /// Solves the problem that is factored and hands the rows to `take`. Soft rows are solved for twice with the same factor,
+    /// the second time pulled towards the first answer: once would leave kinks.
+    fn solved<T>(
+        &self,
+        problem: &Problem,
+        mask: Option<&[MaskValue]>,
+        progress: &Progress,
+        take: impl FnOnce(&Filled<'_>) -> T,
+    ) -> Result<T> {
+        let own = |i: u32, row: &mut Row| self.matches.append_row(&self.source, mask, i, row);
+        if self.matches.method() == MatchMethod::ClosestPoint {
+            return Ok(take(&self.fill.solve(&own, progress)?));
+        }
+        let detail = Detail::new(&self.source, &self.matches, &self.fill, &problem.constraints, own);
+        let first = |i: u32, row: &mut Row| {
+            own(i, row);
+            detail.add_to(i, row);
+        };
+        let smoothed = self.fill.solve(&first, progress)?;
+        let second = |i: u32, row: &mut Row| {
+            smoothed.append_row(i as usize, row);
+            detail.add_to(i, row);
+        };
+        Ok(take(&self.fill.solve(&second, progress)?))
     }
 
-    fn append_given(&self, detail: Option<&Detail>, mask: Option<&[MaskValue]>, i: u32, row: &mut Row) {
-        match detail.map(|detail| detail.row(i)) {
-            Some(pulled) if !pulled.is_empty() => row.extend(pulled),
-            _ => self.matches.append_row(&self.source, mask, i, row),
+    /// Where the mask says so, soft rows are replaced by those that the paper's energy finds between the others.
+    fn inpaint_masked(
+        &mut self,
+        weights: Weights,
+        problem: &Problem,
+        mask: Option<&[MaskValue]>,
+        settings: &Settings,
+        progress: &Progress,
+    ) -> Result<Weights> {
+        let Some(mask) = mask.filter(|mask| mask.contains(&MaskValue::Inpaint)) else { return Ok(weights) };
+        if settings.method == MatchMethod::ClosestPoint {
+            return Ok(weights);
         }
+        let constraint = |(i, known): (usize, &Constraint)| match known {
+            _ if mask[i] == MaskValue::Inpaint => Constraint::Free,
+            Constraint::Free => Constraint::Free,
+            Constraint::Fixed | Constraint::Soft(_) => Constraint::Fixed,
+        };
+        let constraints = problem.constraints.iter().enumerate().map(constraint).collect();
+        let length = settings.smoothness_length.of(self.source.diagonal());
+        let assembled = self.fill.assemble(constraints, length, progress)?;
+        self.fill.factor(assembled, progress)?;
+        let given = |i: u32, row: &mut Row| {
+            let (bones, values) = weights.row(i as usize);
+            row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value))));
+        };
+        let filled = self.fill.solve(&given, progress)?;
+        Ok(self.gather(&filled))
     }
 
     /// Finds the points of another method, if it is another.
@@ -220,22 +270,16 @@ impl Inpainting {
     pub(super) fn constraints(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<Constraint>> {
         settings.check()?;
         self.check_mask(mask)?;
-        let terms = Terms {
-            criteria: self.criteria(settings),
-            softness: settings.softness,
-            smoothness_length: self.smoothness_length(settings),
-            fill: &self.fill,
-        };
+        let terms = Terms { criteria: self.criteria(settings), softness: settings.softness, fill: &self.fill };
         Ok(self.matches.constraints(&terms, mask))
     }
 
-    /// l in world units. The paper's share refers to the source's bounding box, that of confidence to its extent, which no
-    /// rotation changes; where every vertex has a row a longer l does not overshoot, and smooths better.
+    /// l of the system in world units: soft rows need none, for they are solved for twice.
     pub(super) fn smoothness_length(&self, settings: &Settings) -> f64 {
-        settings.smoothness_length.of(match settings.method {
-            MatchMethod::ClosestPoint => self.source.diagonal(),
-            MatchMethod::Confidence => LONGER * self.source.size(),
-        })
+        match settings.method {
+            MatchMethod::ClosestPoint => settings.smoothness_length.of(self.source.diagonal()),
+            MatchMethod::Confidence => 0.0,
+        }
     }
 
     pub(super) fn criteria(&self, settings: &Settings) -> Criteria {

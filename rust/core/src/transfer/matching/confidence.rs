@@ -1,10 +1,10 @@
 //! Every vertex has a row, trusted over a length that grows with its gap and its tilt.
 //!
 //! A vertex takes the point that is nearest in position and direction: the least `|x - y|^2 + mu^2 |n - n'|^2` over the
-//! source's points y, n and n' the unit normals. Its row is data with confidence `b = M (1 / h^2 + l^2 / h^4)`, M the
-//! vertex's area and h the length; both terms of the energy and both of b cross at the frequency 1 / h, so that features
-//! shorter than h are smoothed and longer ones are kept, whatever l is. On the skin h vanishes and the row is copied; a
-//! hand's breadth away it says only what the wider surroundings should be on average.
+//! source's points y, n and n' the unit normals. Its row is data with confidence `b = 4 M / h^2`, M the vertex's area and h the
+//! length, in the harmonic energy `w' S w`, which is solved twice. A wave of wavelength 2 pi h is damped to 0.64 of its height,
+//! shorter ones vanish and longer ones stay. On the skin h vanishes and the row is copied; a hand's breadth away it says only
+//! what the wider surroundings should be on average.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -202,7 +202,5 @@ fn soft(terms: &Terms<'_>, i: usize, length: f64) -> Constraint {
     if length < HELD * edges.fold(f64::INFINITY, f64::min) {
         return Constraint::Fixed;
     }
-    let inverse = 1.0 / (length * length);
-    let l = terms.smoothness_length;
-    Constraint::Soft(laplacian.mass(i) * (inverse + l * l * inverse * inverse))
+    Constraint::Soft(4.0 * laplacian.mass(i) / (length * length))
 }

@@ -62,8 +62,6 @@ pub struct Terms<'a> {
     pub criteria: Criteria,
     /// Lengths of trust as multiples of gaps.
     pub softness: f64,
-    /// l of the energy, world units.
-    pub smoothness_length: f64,
     /// The target's areas, edges and islands.
     pub fill: &'a Fill,
 }
