@@ -207,7 +207,7 @@ def test_small_loose_parts_become_rigid(method):
 def test_a_garment_far_away_still_gets_rows():
     """There is no threshold that could leave all of it without any."""
     source, (cloth, faces) = tubes()
-    answer = native_source(*source).transfer(cloth + (0, 3, 0), faces, method="confidence")
+    answer = native_source(*source).transfer(cloth + np.array([0, 3, 0]), faces, method="confidence")
     assert answer.report["unmatched_islands"] == []
     np.testing.assert_allclose(dense(answer).sum(axis=1), 1, atol=1e-6)
 
