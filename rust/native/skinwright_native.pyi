@@ -66,11 +66,14 @@ class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
     `method`: "paper" copies the closest point's weights where distance and angle are within their thresholds and ignores
-    them elsewhere; "confidence" takes the point nearest in position and direction, and trusts it over `softness` times
-    its gap: there the thresholds only tell which islands have a match at all.
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    them elsewhere; "confidence" takes the point nearest in position and direction and trusts it over `softness` times its
+    gap: there the thresholds tell only which islands have a match at all, and the smoothness length how masked vertices are
+    filled in.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if that is
+    larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices that
+    close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
     `island_policy`: what islands without any match get; rows that "skip" leaves are empty. `small_islands`: "rigid" gives
@@ -84,6 +87,7 @@ class TransferSettings(TypedDict, total=False):
     max_normal_angle: float
     match_flipped_normals: bool
     mask: ArrayLike | None
+    relative_weld_tolerance: float
     smoothness_length: float | None
     relative_smoothness_length: float
     smoothing_iterations: int
@@ -105,6 +109,7 @@ class Source:
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
+        target_edges: ArrayLike | None = None,
         threads: int = 0,
         **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
@@ -120,8 +125,9 @@ class Inpainting:
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
-        method: MatchMethod = "paper",
+        target_edges: ArrayLike | None = None,
         threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Inpainting: ...
     @property
     def distance(self) -> NDArray[np.float32]: ...
@@ -154,6 +160,7 @@ def transfer_weights(
     target_positions: ArrayLike,
     target_triangles: ArrayLike,
     *,
+    target_edges: ArrayLike | None = None,
     method: MatchMethod = "paper",
     softness: float = 0.7,
     max_distance: float | None = None,
@@ -161,6 +168,7 @@ def transfer_weights(
     max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
+    relative_weld_tolerance: float = 1e-06,
     smoothness_length: float | None = None,
     relative_smoothness_length: float = 0.05,
     smoothing_iterations: int = 0,

@@ -73,6 +73,11 @@ class Inpainting:
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands
 
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the source other weights; a solve with them factors nothing that is factored already."""
+        with _naming(self.name):
+            self._inpainting.set_source_weights(_module.Weights(*rows, n_columns))
+
     def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
         """(V,) which vertices match; waits for a job that is going on."""
         with _naming(self.name):

@@ -31,14 +31,11 @@ class Result:
 
 def compute(body: Body, garments: list[Garment], params: TransferParams) -> Jobs[list[Result]]:
     """The new rows of every garment. Raises native.NativeError where there is no answer."""
-    bones = bone_source(body) if body.bones else None
-    fields = None
-    if body.fields:
-        packed = scalar_fields.pack(body.field_weights, len(body.fields))
-        fields = _source(body, packed, len(body.fields) + 1)
+    packed = scalar_fields.pack(body.field_weights, len(body.fields)) if body.fields else None
+    source = bone_source(body) if body.bones else _source(body, packed, len(body.fields) + 1)
     results = []
     for garment in garments:
-        results.append((yield from _compute_one(body, garment, bones, fields, params)))
+        results.append((yield from _compute_one(body, garment, source, packed, params)))
     return results
 
 
@@ -61,18 +58,23 @@ def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
 
 
 def _compute_one(
-    body: Body, garment: Garment, bones: native.Source | None, fields: native.Source | None, params: TransferParams
+    body: Body, garment: Garment, source: native.Source, fields: Rows | None, params: TransferParams
 ) -> Jobs[Result]:
     start = time.perf_counter()
-    names: list[str] = []
-    rows = csr.empty(len(garment.writable))
-    if fields:
-        transfer, rows = yield from _field_rows(fields, garment, params, len(body.fields))
-        names = body.fields
-    if bones:
-        transfer, rows_of_bones = yield from bone_rows(prepare(bones, garment, params), garment, params)
-        rows = csr.beside(rows, len(names), rows_of_bones)
-        names = names + garment.names
+    inpainting = prepare(source, garment, params)
+    if body.bones:
+        transfer, rows = yield from bone_rows(inpainting, garment, params)
+        names = garment.names
+    else:
+        names, rows = [], csr.empty(len(garment.writable))
+    if fields is not None:
+        if body.bones:
+            # Points and factorisations are those of the bones: only the solve is done again.
+            inpainting.set_source_weights(fields, len(body.fields) + 1)
+        of_fields, rows_of_fields = yield from _field_rows(inpainting, garment, params, len(body.fields))
+        transfer = transfer if body.bones else of_fields
+        rows = csr.beside(rows_of_fields, len(body.fields), rows)
+        names = body.fields + names
     return to_result(body, garment, transfer, names, rows, time.perf_counter() - start)
 
 
@@ -112,8 +114,10 @@ def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
         raise native.NativeError(f"{garment.object.name}: the answer is no set of weights; please report this")
 
 
-def _field_rows(fields: native.Source, garment: Garment, params: TransferParams, n: int) -> Jobs[tuple[Any, Rows]]:
-    transfer, rows = yield _start(prepare(fields, garment, params), garment, params, max_influences=0)
+def _field_rows(
+    inpainting: native.Inpainting, garment: Garment, params: TransferParams, n: int
+) -> Jobs[tuple[Any, Rows]]:
+    transfer, rows = yield _start(inpainting, garment, params, max_influences=0)
     return transfer, merging.mix(scalar_fields.unpack(rows, n), garment.fields_before, params.mix_factor)
 
 

@@ -71,14 +71,18 @@ impl Weld {
         self.starts[..self.class_count()].iter().map(|&start| self.members[start as usize])
     }
 
-    /// The mesh in which they are one: positions (C, 3) of the representatives, and the triangles (T, 3) over classes, of
-    /// which some may name a vertex twice or repeat others.
-    pub fn welded(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    /// The mesh in which they are one: positions (C, 3) of the representatives, and the triangles (T, 3) and edges (E, 2) over
+    /// classes, of which some may name a vertex twice or repeat others.
+    pub fn welded(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]], edges: &[[u32; 2]]) -> WeldedArrays {
         let positions = self.representatives().map(|i| positions[i as usize]).collect();
-        let triangles = triangles.par_iter().with_min_len(4096).map(|t| t.map(|i| self.class_of[i as usize])).collect();
-        (positions, triangles)
+        let class = |i: u32| self.class_of[i as usize];
+        let triangles = triangles.par_iter().with_min_len(4096).map(|t| t.map(class)).collect();
+        (positions, triangles, edges.iter().map(|edge| edge.map(class)).collect())
     }
 }
+
+/// Positions (C, 3), triangles (T, 3) and edges (E, 2).
+pub type WeldedArrays = (Vec<[f32; 3]>, Vec<[u32; 3]>, Vec<[u32; 2]>);
 
 /// Cells are this many tolerances wide, so that few points lie within the tolerance of a neighbouring cell.
 const CELL: f64 = 64.0;

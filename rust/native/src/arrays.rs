@@ -1,5 +1,6 @@
 //! NumPy arrays in (any array-like, cast and copied once) and out (moved, read-only).
 
+use numpy::ndarray::ArrayView1;
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike1, PyArrayLike2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -12,14 +13,25 @@ pub type Matrix<'py, T> = PyArrayLike2<'py, T, AllowTypeChange>;
 
 /// Rows of an (N, 3) array; `name` is the argument's.
 pub fn triples<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
-    if array.shape()[1] != 3 {
-        let shape = array.shape();
-        return Err(InvalidParameter::new_err(format!(
-            "{name} must have shape (N, 3), not ({}, {})",
-            shape[0], shape[1]
-        )));
+    rows_of(array, name, |row| [row[0], row[1], row[2]])
+}
+
+/// Rows of an (N, 2) array; `name` is the argument's.
+pub fn pairs<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 2]>> {
+    rows_of(array, name, |row| [row[0], row[1]])
+}
+
+fn rows_of<T: Element, const N: usize>(
+    array: &Matrix<'_, T>,
+    name: &str,
+    row: impl Fn(ArrayView1<'_, T>) -> [T; N],
+) -> PyResult<Vec<[T; N]>> {
+    let shape = array.shape();
+    if shape[1] != N {
+        let (found, columns) = (shape[0], shape[1]);
+        return Err(InvalidParameter::new_err(format!("{name} must have shape (N, {N}), not ({found}, {columns})")));
     }
-    Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+    Ok(array.as_array().rows().into_iter().map(row).collect())
 }
 
 /// Entries of a 1-D array.

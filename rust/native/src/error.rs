@@ -25,9 +25,10 @@ pub fn to_python(error: Error) -> PyErr {
     let sentence = error.to_string();
     match error {
         Error::NothingMatched { .. } => NothingMatched::new_err(sentence),
-        Error::NoTriangles { .. } | Error::PositionNotFinite { .. } | Error::VertexOutOfRange { .. } => {
-            InvalidMesh::new_err(sentence)
-        }
+        Error::NoTriangles { .. }
+        | Error::PositionNotFinite { .. }
+        | Error::VertexOutOfRange { .. }
+        | Error::EdgeOutOfRange { .. } => InvalidMesh::new_err(sentence),
         Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {
             InvalidWeights::new_err(sentence)
         }

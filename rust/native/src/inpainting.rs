@@ -6,14 +6,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use skinwright_core::Progress;
-use skinwright_core::transfer as core;
+use skinwright_core::transfer::{self as core, TargetMesh};
 
-use crate::arrays::{Matrix, read_only, triples};
+use crate::arrays::{Matrix, pairs, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
-use crate::settings::{keywords, method};
+use crate::settings::keywords;
 use crate::source::Source;
-use crate::transfer::{Closest, Transfer};
+use crate::transfer::Transfer;
 use crate::weights::Weights;
 
 /// Unknowns (U,) and their solution (U, n_bones).
@@ -24,7 +24,8 @@ type RawWeights<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Inpainting {
     core: Arc<Mutex<core::Inpainting>>,
-    closest: Arc<Closest>,
+    distance: Py<PyArray1<f32>>,
+    angle: Py<PyArray1<f32>>,
     islands: Py<PyArray1<u32>>,
     threads: usize,
 }
@@ -40,6 +41,19 @@ impl Inpainting {
     }
 }
 
+/// The target's arrays.
+pub(crate) fn target_mesh(
+    positions: &Matrix<'_, f32>,
+    triangles: &Matrix<'_, u32>,
+    edges: Option<&Matrix<'_, u32>>,
+) -> PyResult<TargetMesh> {
+    Ok(TargetMesh {
+        positions: triples(positions, "target_positions")?,
+        triangles: triples(triangles, "target_triangles")?,
+        edges: edges.map(|edges| pairs(edges, "target_edges")).transpose()?.unwrap_or_default(),
+    })
+}
+
 /// A panic while solving leaves only kept blocks behind, and those are whole: a poisoned lock may be used on.
 fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting> {
     inpainting.lock().unwrap_or_else(PoisonError::into_inner)
@@ -48,37 +62,35 @@ fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting
 #[pymethods]
 impl Inpainting {
     #[new]
-    #[pyo3(signature = (source, target_positions, target_triangles, *, method="paper", threads=0))]
+    #[pyo3(signature = (source, target_positions, target_triangles, *, target_edges=None, threads=0, **settings))]
     fn new(
         py: Python<'_>,
         source: &Source,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
-        method: &str,
+        target_edges: Option<Matrix<'_, u32>>,
         threads: usize,
+        settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let method = self::method(method)?;
-        let positions = triples(&target_positions, "target_positions")?;
-        let triangles = triples(&target_triangles, "target_triangles")?;
+        let (settings, _) = keywords(settings)?;
+        let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
         let source = source.core.clone();
-        let core = enter(py, threads, || {
-            core::Inpainting::new(source, positions, triangles, method, &Progress::default())
-        })?;
-        let closest = Arc::new(Closest::of(py, &core)?);
-        let islands = read_only(py, core.islands().of_vertex().to_vec())?;
-        Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, threads })
+        let core = enter(py, threads, || core::Inpainting::new(source, target, &settings, &Progress::default()))?;
+        let (distance, angle) = (read_only(py, core.distances())?, read_only(py, core.angles())?);
+        let islands = read_only(py, core.island_of_vertex())?;
+        Ok(Self { core: Arc::new(Mutex::new(core)), distance, angle, islands, threads })
     }
 
     /// Distance of each vertex to its closest source point (V,), world units.
     #[getter]
     fn distance(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
-        self.closest.distance.clone_ref(py)
+        self.distance.clone_ref(py)
     }
 
     /// Angle between the normals there (V,), radians, NaN where a normal is missing.
     #[getter]
     fn angle(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
-        self.closest.angle.clone_ref(py)
+        self.angle.clone_ref(py)
     }
 
     /// Island of each vertex (V,), 4294967295 for a vertex that no triangle uses.
@@ -87,7 +99,7 @@ impl Inpainting {
         self.islands.clone_ref(py)
     }
 
-    /// Gives the source other weights; nothing geometric is computed anew.
+    /// Gives the source other weights; nothing geometric is computed again.
     fn set_source_weights(&self, py: Python<'_>, weights: &Weights) -> PyResult<()> {
         let weights = weights.to_core(py)?;
         self.enter(py, |inpainting| inpainting.set_source_weights(weights))
@@ -124,16 +136,16 @@ impl Inpainting {
         let solve =
             |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
         let transfer = self.enter(py, solve)?;
-        self.closest.present(py, transfer)
+        Transfer::of(py, transfer)
     }
 
     /// Starts `solve` on threads of its own.
     #[pyo3(signature = (**settings))]
     fn start(&self, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
         let (settings, mask) = keywords(settings)?;
-        let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
+        let core = Arc::clone(&self.core);
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Ok(Job::start(self.threads, work, Box::new(move |py, transfer| closest.present(py, transfer))))
+        Ok(Job::start(self.threads, work))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other

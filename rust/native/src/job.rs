@@ -10,15 +10,12 @@ use crate::error::{Outcome, finish, run};
 use crate::transfer::Transfer;
 
 type TransferOutcome = Outcome<skinwright_core::transfer::Transfer>;
-/// Turns the core's result into what Python gets.
-type Present = Box<dyn Fn(Python<'_>, skinwright_core::transfer::Transfer) -> PyResult<Transfer> + Send + Sync>;
 
 /// Work going on on Rust's own threads; poll it from a timer.
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Job {
     progress: Arc<Progress>,
     thread: Mutex<Option<JoinHandle<TransferOutcome>>>,
-    present: Present,
     result: OnceLock<PyResult<Py<Transfer>>>,
 }
 
@@ -27,12 +24,11 @@ impl Job {
     pub fn start(
         threads: usize,
         work: impl FnOnce(&Progress) -> skinwright_core::Result<skinwright_core::transfer::Transfer> + Send + 'static,
-        present: Present,
     ) -> Self {
         let progress = Arc::new(Progress::default());
         let seen = Arc::clone(&progress);
         let thread = std::thread::spawn(move || run(threads, move || work(&seen)));
-        Self { progress, thread: Mutex::new(Some(thread)), present, result: OnceLock::new() }
+        Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() }
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<Py<Transfer>> {
@@ -41,7 +37,7 @@ impl Job {
             return Err(crate::error::SkinwrightError::new_err("another thread is waiting for this job"));
         };
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
-        Py::new(py, (self.present)(py, finish(outcome)?)?)
+        Py::new(py, Transfer::of(py, finish(outcome)?)?)
     }
 }
 

@@ -43,11 +43,6 @@ fn named<T: Copy, const N: usize>(setting: &str, value: &str, all: [T; N], name:
     })
 }
 
-/// The method that a name stands for.
-pub(crate) fn method(value: &str) -> PyResult<MatchMethod> {
-    named("method", value, MatchMethod::ALL, method_name)
-}
-
 /// Settings and mask from keyword arguments; what is absent keeps the core's default.
 pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settings, Option<Vec<MaskValue>>)> {
     let (mut settings, mut mask) = (Settings::default(), None);
@@ -58,13 +53,14 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "relative_max_distance" => settings.max_distance = Length::Relative(value.extract()?),
             "max_normal_angle" => settings.max_normal_angle = value.extract()?,
             "match_flipped_normals" => settings.match_flipped_normals = value.extract()?,
+            "relative_weld_tolerance" => settings.weld_tolerance = Length::Relative(value.extract()?),
             "mask" => mask = mask_values(value.extract()?)?,
             "smoothness_length" => smoothness_length = value.extract()?,
             "relative_smoothness_length" => settings.smoothness_length = Length::Relative(value.extract()?),
             "smoothing_iterations" => settings.smoothing_iterations = value.extract()?,
             "smoothing_factor" => settings.smoothing_factor = value.extract()?,
             "max_influences" => settings.max_influences = value.extract()?,
-            "method" => settings.method = method(value.extract()?)?,
+            "method" => settings.method = named("method", value.extract()?, MatchMethod::ALL, method_name)?,
             "softness" => settings.softness = value.extract()?,
             "island_policy" => {
                 settings.island_policy = named("island_policy", value.extract()?, IslandPolicy::ALL, policy_name)?;

@@ -10,7 +10,7 @@ mod nearest;
 mod node;
 mod search;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use pulp::Arch;
 use rayon::prelude::*;
 
@@ -18,6 +18,8 @@ use crate::mesh::TriMesh;
 use bvh::Bvh;
 pub use cheapest::{Bound, Priced};
 use search::Batch;
+
+pub(crate) use morton::order as morton_order;
 
 /// Queries that one task answers; within a task each search starts from the last one's answer.
 const BATCH: usize = 512;
@@ -111,4 +113,9 @@ impl SurfaceIndex {
     fn answer(&self, queries: &[[f32; 3]], answers: &mut [SurfacePoint]) {
         Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
     }
+}
+
+/// Squared distance of a point to a triangle, as [`SurfaceIndex`] measures it.
+pub(crate) fn squared_distance_to_triangle(query: DVec3, corners: [DVec3; 3]) -> f64 {
+    closest_point::closest_to_origin(corners.map(|corner| corner - query)).1
 }

@@ -41,14 +41,15 @@ impl Place {
     }
 }
 
-/// What is added to the rows that soft vertices are pulled towards, so that detail is kept: `S_t W0 / b`.
+/// The source's rows, and what is added to those of soft vertices so that detail is kept: `S_t W0 / b`.
 #[derive(Debug)]
 pub(super) struct Detail {
-    rows: Vec<Row>,
+    own: Vec<Row>,
+    added: Vec<Row>,
 }
 
 impl Detail {
-    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are soft.
+    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are known and which are soft.
     pub fn new(
         source: &Source,
         matches: &Matches,
@@ -61,15 +62,18 @@ impl Detail {
                 rows(i as u32, row)
             }
         });
-        Self { rows: guidance(source, matches, fill, constraints, &own) }
+        let added = guidance(source, matches, fill, constraints, &own);
+        Self { own, added }
     }
 
-    /// Adds it to the row of vertex `i`, which is sorted by column.
-    pub fn add_to(&self, i: u32, row: &mut Row) {
-        if !self.rows[i as usize].is_empty() {
-            row.extend(&self.rows[i as usize]);
-            add_up(row);
-        }
+    /// The source's row of vertex `i`, empty where it is not asked for.
+    pub fn own(&self, i: u32) -> &Row {
+        &self.own[i as usize]
+    }
+
+    /// What is added to it.
+    pub fn added(&self, i: u32) -> &Row {
+        &self.added[i as usize]
     }
 }
 

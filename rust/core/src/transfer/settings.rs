@@ -34,8 +34,11 @@ pub struct Settings {
     /// How soft [`MatchMethod::Confidence`] is: the length over which a row is trusted, as a multiple of the gap to the source.
     /// Default 0.7; 0.35 to 1.4 are useful.
     pub softness: f64,
-    /// Largest distance of a match; relative to the target's diagonal. Default 0.05 relative.
+    /// Largest distance of a match; relative to the target's diagonal, or to 30 % of the source's if that is larger. Default
+    /// 0.05 relative.
     pub max_distance: Length,
+    /// Vertices no farther apart than this are one; relative to the target's diagonal, 0 for none. Default 1e-6 relative.
+    pub weld_tolerance: Length,
     /// Largest angle between normals of a match, radians. Default 35 degrees.
     pub max_normal_angle: f64,
     /// Whether opposite normals match too. Default true.
@@ -61,6 +64,7 @@ impl Default for Settings {
             method: MatchMethod::ClosestPoint,
             softness: 0.7,
             max_distance: Length::Relative(0.05),
+            weld_tolerance: Length::Relative(1e-6),
             max_normal_angle: 35f64.to_radians(),
             match_flipped_normals: true,
             smoothness_length: Length::Relative(0.05),
@@ -87,6 +91,7 @@ impl Settings {
     /// [`Error::InvalidParameter`] for the first value out of range.
     pub fn check(&self) -> Result<()> {
         self.max_distance.check("max_distance")?;
+        self.weld_tolerance.check("weld_tolerance")?;
         self.smoothness_length.check("smoothness_length")?;
         let softness = self.softness;
         check_range("softness", softness, softness > 0.0, "must be a number above 0")?;

@@ -4,10 +4,15 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::normals;
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 use crate::surface::{SurfaceIndex, SurfacePoint};
 use crate::weights::Weights;
+use crate::weld::Weld;
+
+/// Vertices no farther apart than this share of the diagonal are one, as far as normals are concerned.
+const WELD_TOLERANCE: f64 = 1e-6;
 
 /// A weighted mesh with its bounding volume hierarchy and normals. Owns its data; a clone shares it.
 #[derive(Debug, Clone)]
@@ -19,12 +24,12 @@ pub struct Source {
 #[derive(Debug)]
 struct Geometry {
     positions: Vec<[f32; 3]>,
+    size: f64,
+    areas: Vec<f32>,
     triangles: Vec<[u32; 3]>,
     index: SurfaceIndex,
     normals: Vec<Vec3>,
     diagonal: f64,
-    size: f64,
-    areas: Vec<f32>,
 }
 
 /// The source's weights and what is wrong with them.
@@ -42,10 +47,15 @@ impl Source {
     pub fn new(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, weights: Weights) -> Result<Self> {
         let mesh = TriMesh::new(positions, &triangles, "source")?;
         let weights = SourceWeights::new(weights, mesh.vertex_count())?;
-        let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), || mesh.vertex_normals());
         let diagonal = mesh.diagonal();
+        let normals = || {
+            let weld = Weld::coincident(positions, WELD_TOLERANCE * diagonal);
+            normals::of_source(&mesh, weld.as_ref())
+        };
+        let (index, normals) = rayon::join(|| SurfaceIndex::new(&mesh), normals);
         let (areas, size) = (areas(&mesh), size(&mesh));
-        let geometry = Geometry { positions: positions.to_vec(), index, normals, diagonal, size, areas, triangles };
+        let positions = positions.to_vec();
+        let geometry = Geometry { index, normals, diagonal, size, areas, triangles, positions };
         Ok(Self { geometry: Arc::new(geometry), weights: Arc::new(weights) })
     }
 
@@ -63,7 +73,8 @@ impl Source {
         &self.geometry.triangles
     }
 
-    /// Area-weighted vertex normals, (V, 3).
+    /// Area-weighted vertex normals, (V, 3); vertices that only the file keeps apart have one, unless they lie on opposite
+    /// sides of a sheet.
     pub fn normals(&self) -> &[Vec3] {
         &self.geometry.normals
     }
@@ -82,13 +93,6 @@ impl Source {
     /// Within 8 % of the bounding box's diagonal for a person, but no rotation changes it.
     pub fn size(&self) -> f64 {
         self.geometry.size
-    }
-
-    /// World position of a point of the surface.
-    pub fn position(&self, point: &SurfacePoint) -> DVec3 {
-        let corners = self.geometry.triangles[point.triangle as usize];
-        let corner = |i: u32| Vec3::from(self.geometry.positions[i as usize]).as_dvec3();
-        std::iter::zip(corners, point.barycentric).map(|(i, share)| corner(i) * share).sum()
     }
 
     /// Area of triangle `t`.
@@ -123,6 +127,19 @@ impl Source {
         merge_and_normalise(row, start);
     }
 
+    /// Position of a surface point.
+    pub(super) fn position(&self, point: &SurfacePoint) -> DVec3 {
+        let corners = self.geometry.triangles[point.triangle as usize].map(|i| self.geometry.positions[i as usize]);
+        std::iter::zip(corners, point.barycentric).map(|(p, share)| Vec3::from(p).as_dvec3() * share).sum()
+    }
+
+    /// Whether a position lies behind the triangle of a surface point.
+    pub(super) fn is_behind(&self, point: &SurfacePoint, position: [f32; 3]) -> bool {
+        let corners = self.geometry.triangles[point.triangle as usize];
+        let [a, b, c] = corners.map(|i| Vec3::from(self.geometry.positions[i as usize]).as_dvec3());
+        (Vec3::from(position).as_dvec3() - a).dot((b - a).cross(c - a)) < 0.0
+    }
+
     /// Whether [`Source::blend`] appends anything at a point.
     pub(super) fn is_weighted(&self, point: &SurfacePoint) -> bool {
         let corners = self.geometry.triangles[point.triangle as usize];
@@ -132,11 +149,7 @@ impl Source {
 }
 
 fn areas(mesh: &TriMesh<'_>) -> Vec<f32> {
-    let area = |&[a, b, c]: &[u32; 3]| {
-        let [a, b, c] = [a, b, c].map(|i| mesh.position(i));
-        0.5 * (b - a).cross(c - a).length()
-    };
-    mesh.triangles().iter().map(|t| area(t) as f32).collect()
+    mesh.triangles().iter().map(|t| 0.5 * mesh.doubled_area(t).length() as f32).collect()
 }
 
 /// See [`Source::size`]; the moments of triangles are exact.

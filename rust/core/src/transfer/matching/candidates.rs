@@ -56,6 +56,11 @@ impl Candidates {
         &self.first
     }
 
+    /// Puts another point in the place of the first one of vertex `i`.
+    pub(super) fn set_first(&mut self, i: usize, point: SurfacePoint) {
+        self.first[i] = point;
+    }
+
     /// Whether the source has any weight at the points of each vertex, (V).
     pub(super) fn weighted(&self, source: &Source) -> Vec<bool> {
         let has_weight = |i| match self.several.of(i) {

@@ -72,7 +72,11 @@ struct Choice {
 pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, Trust) {
     let size = source.size();
     let closest = source.index().closest_points(target.positions);
-    let cost = |i: usize, point: &SurfacePoint| cost(point.distance, cosine(source, point, target.normals[i]), size);
+    let cosine = |i: usize, point: &SurfacePoint| {
+        let cosine = cosine(source, point, target.normals[i]);
+        if target.two_sided[i] { cosine.map(f64::abs) } else { cosine }
+    };
+    let cost = |i: usize, point: &SurfacePoint| cost(point.distance, cosine(i, point), size);
     let bound = |(i, point): (usize, &SurfacePoint)| {
         let own = cost(i, point);
         let near = point.distance + EQUALLY_NEAR * size;
@@ -81,8 +85,7 @@ pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, T
     };
     let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
     let finish = |i: usize, found: &[Priced]| {
-        let priced: Vec<(Priced, f64)> =
-            found.iter().map(|&p| (p, cosine(source, &p.point, target.normals[i]).unwrap_or(1.0))).collect();
+        let priced: Vec<(Priced, f64)> = found.iter().map(|&p| (p, cosine(i, &p.point).unwrap_or(1.0))).collect();
         choose(source, &priced, closest[i].distance, size)
     };
     let choices = source.index().cheapest_points(target.positions, &bounds, SLACK, cost, finish);
