@@ -40,6 +40,14 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
 
 
+def source_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals; vertices at one place, as at the seams between the parts of a body, share one."""
+    _, one = np.unique(positions, axis=0, return_inverse=True)
+    sums = np.zeros((one.max() + 1, 3))
+    np.add.at(sums, one.ravel(), oracle.vertex_normals(positions, triangles))
+    return unit(sums)[one.ravel()]
+
+
 def closest_on_triangles(point: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Barycentric shares (T, 3) of the point of each triangle (T, 3, 3) that is closest to `point`."""
     shares, squared = np.zeros((len(corners), 3)), np.full(len(corners), np.inf)
@@ -67,7 +75,7 @@ def trusted(source: tuple, target: tuple) -> Trusted:
     positions, triangles, weights = source
     points, faces = target
     extent, dense = size(positions, triangles), oracle.normalised(weights).toarray()
-    corners, source_normals = positions[triangles], unit(oracle.vertex_normals(positions, triangles))
+    corners, body_normals = positions[triangles], source_normals(positions, triangles)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     normals = unit(oracle.vertex_normals(points, faces))
     found = Trusted(np.zeros((len(points), dense.shape[1])), *(np.zeros(len(points)) for _ in range(2)), points.copy())
@@ -75,7 +83,7 @@ def trusted(source: tuple, target: tuple) -> Trusted:
         shares = closest_on_triangles(point, corners)
         on = np.einsum("tk,tki->ti", shares, corners)
         distance = np.linalg.norm(on - point, axis=1)
-        cosine = unit(np.einsum("tk,tki->ti", shares, source_normals[triangles])) @ normal
+        cosine = unit(np.einsum("tk,tki->ti", shares, body_normals[triangles])) @ normal
         cost = distance**2 + 2 * (DIRECTION * extent) ** 2 * (1 - np.clip(cosine, -1, 1))
         near = distance <= distance.min() + EQUALLY_NEAR * extent
         best_near, best = cost[near].min(), cost.min()

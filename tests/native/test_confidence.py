@@ -65,7 +65,7 @@ def test_raw_weights_equal_brute_force(name):
     prepared = native.Inpainting(native_source(*source), *target, method="confidence")
     expected = confidence_oracle.transfer(source, target)
     vertices, raw = prepared.raw_weights(method="confidence")
-    assert len(vertices) > 0.2 * len(target[0])
+    assert len(vertices) > 0.1 * len(target[0])
     np.testing.assert_allclose(raw, expected[vertices], atol=2e-5)
     answer = dense(prepared.solve(method="confidence", small_islands="solved"))
     clamped = np.clip(expected, 0, None)
@@ -152,11 +152,12 @@ def test_order_and_threads_change_nothing():
 def test_a_symmetric_garment_gets_symmetric_rows():
     """Vertices in the middle are equally near to both limbs, and take from both alike."""
     (positions, triangles, weights), _ = tubes()
-    positions = np.round(positions * 4096) / 4096  # so that mirroring is exact
-    half = len(positions) // 2
-    assert np.array_equal(
-        positions[half:] - positions[:half], np.broadcast_to(positions[half] - positions[0], (half, 3))
-    )
+    half, weights = len(positions) // 2, weights.toarray()
+    right = positions[half:]
+    positions = np.vstack([right * (-1, 1, 1), right])
+    faces = triangles[len(triangles) // 2 :] - half
+    triangles = np.vstack([faces[:, ::-1], faces + half])
+    weights[:half] = weights[half:][:, [1, 0, 3, 2]]
     x, z = np.meshgrid(np.linspace(-0.25, 0.25, 17), np.linspace(0, 1, 9), indexing="ij")
     cloth = np.round(np.stack([x, np.full(x.shape, -0.125), z], axis=-1).reshape(-1, 3) * 4096) / 4096
     i, j = np.meshgrid(np.arange(16), np.arange(8), indexing="ij")
@@ -169,11 +170,10 @@ def test_a_symmetric_garment_gets_symmetric_rows():
         native_source(positions, triangles, weights).transfer(cloth, np.vstack([first, second]), method="confidence")
     )
     difference = np.abs(found[mirror.ravel()][:, [1, 0, 3, 2]] - found).max(axis=1)
-    # The limbs' own diagonals are not mirrored, which moves a closest point on them a little.
-    assert difference.max() < 0.01
+    assert difference.max() < 1e-4
     middle = found.reshape(17, 9, 4)[8]
     np.testing.assert_allclose(middle[:, :2].sum(axis=1) + middle[:, 2:].sum(axis=1), 1, atol=1e-6)
-    assert np.abs(middle[:, 0] + middle[:, 2] - 0.5).max() < 0.01
+    np.testing.assert_allclose(middle[:, 0] + middle[:, 2], 0.5, atol=1e-4)
 
 
 @pytest.mark.parametrize("method", ["paper", "confidence"])

@@ -85,8 +85,8 @@ fn guidance(source: &Source, matches: &Matches, fill: &Fill, constraints: &[Cons
     };
     let places: Vec<Place> = (0..own.len()).into_par_iter().with_min_len(512).map(place).collect();
     let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
-    collect(own.len(), |i, row| {
-        let Constraint::Soft(confidence) = constraints[i] else { return };
+    let row = |sum: &mut RowSum, i: usize| {
+        let Constraint::Soft(confidence) = constraints[i] else { return Row::new() };
         for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
             let (here, there) = (&own[i], &own[j as usize]);
             if here == there || here.is_empty() || there.is_empty() {
@@ -94,34 +94,44 @@ fn guidance(source: &Source, matches: &Matches, fill: &Fill, constraints: &[Cons
             }
             let length = mesh.position(i as u32).distance(mesh.position(j));
             let weight = cotangent * places[i].trust(&places[j as usize], length, source.size()) / confidence;
-            append_scaled(row, here, weight);
-            append_scaled(row, there, -weight);
+            sum.add(here, weight);
+            sum.add(there, -weight);
         }
-        add_up(row);
-    })
-}
-
-fn collect(n: usize, append: impl Fn(usize, &mut Row) + Sync) -> Vec<Row> {
-    let one = |i| {
-        let mut row = Row::new();
-        append(i, &mut row);
-        row
+        sum.take()
     };
-    (0..n).into_par_iter().with_min_len(256).map(one).collect()
+    let start = || RowSum::new(source.n_bones());
+    (0..own.len()).into_par_iter().with_min_len(256).map_init(start, row).collect()
 }
 
-fn append_scaled(row: &mut Row, other: &Row, factor: f64) {
-    row.extend(other.iter().map(|&(column, value)| (column, factor * value)));
+/// A row under construction, dense, and the columns that it has.
+struct RowSum {
+    values: Vec<f64>,
+    is_used: Vec<bool>,
+    columns: Vec<u32>,
 }
 
-/// Sorts by column and adds up equal ones; the sort is stable, so that the sum does not depend on chance.
-fn add_up(row: &mut Row) {
-    row.sort_by_key(|&(column, _)| column);
-    row.dedup_by(|next, kept| {
-        let equal = next.0 == kept.0;
-        if equal {
-            kept.1 += next.1;
+impl RowSum {
+    fn new(n_columns: u32) -> Self {
+        let n = n_columns as usize;
+        Self { values: vec![0.0; n], is_used: vec![false; n], columns: Vec::new() }
+    }
+
+    fn add(&mut self, row: &Row, factor: f64) {
+        for &(column, value) in row {
+            let k = column as usize;
+            if !std::mem::replace(&mut self.is_used[k], true) {
+                self.columns.push(column);
+            }
+            self.values[k] += factor * value;
         }
-        equal
-    });
+    }
+
+    /// The row, by column, and an empty one in its place.
+    fn take(&mut self) -> Row {
+        self.columns.sort_unstable();
+        let row =
+            self.columns.iter().map(|&column| (column, std::mem::take(&mut self.values[column as usize]))).collect();
+        self.columns.drain(..).for_each(|column| self.is_used[column as usize] = false);
+        row
+    }
 }
