@@ -57,11 +57,14 @@ impl Detail {
         constraints: &[Constraint],
         rows: impl Fn(u32, &mut Row) + Sync,
     ) -> Self {
-        let own = collect(constraints.len(), |i, row| {
+        let own = |i: usize| {
+            let mut row = Row::new();
             if constraints[i].is_known() {
-                rows(i as u32, row)
+                rows(i as u32, &mut row);
             }
-        });
+            row
+        };
+        let own: Vec<Row> = (0..constraints.len()).into_par_iter().with_min_len(256).map(own).collect();
         let added = guidance(source, matches, fill, constraints, &own);
         Self { own, added }
     }

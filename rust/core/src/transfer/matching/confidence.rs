@@ -34,7 +34,7 @@ const TILT: f64 = 3.0;
 const LEAST_COSINE: f64 = 0.05;
 /// A vertex is held at its row if it is trusted over less than this share of its shortest edge: smoothing over so little
 /// changes nothing that the mesh can show.
-const HELD: f64 = 0.5;
+const HELD: f64 = 0.25;
 /// Length, as a share of the source's size, at which a vertex is trusted by half.
 const HALF_TRUSTED: f64 = 0.02;
 
