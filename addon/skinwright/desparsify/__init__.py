@@ -35,11 +35,7 @@ def desparsify(obj: bpy.types.Object, params: DesparsifyParams) -> DesparsifyRep
     deforming = np.isin(names, sorted(armature.deform_bones(rig)))
     before = csr.keep_columns(vertex_groups.read(obj, names), deforming)
     after = _solve(obj, rig, names, deforming, before, params)
-    vertices = (
-        np.flatnonzero(mesh.selected(obj))
-        if params.selected_only
-        else np.arange(len(obj.data.vertices), dtype=np.int64)
-    )
+    vertices = np.flatnonzero(mesh.selected(obj)) if params.selected_only else np.arange(len(obj.data.vertices), dtype=np.int64)
     return _write(obj, names, vertices, before, after, params.n)
 
 

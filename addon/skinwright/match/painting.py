@@ -9,10 +9,10 @@ import time
 import bpy
 
 from .. import jobs, native
+from .session import MatchSession
 from ..scene import changes, mask, vertex_groups
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
-from .session import MatchSession
 
 # A solve this short is waited for: the view would be drawn in between, which takes about as long.
 PATIENCE_SECONDS = 0.4

@@ -8,9 +8,9 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy.types import Context, Operator
 
-from ..check.weight_check import Fault, Limits, WeightCheck, check
 from ..scene import mesh
 from ..scene.error import SceneError
+from ..check.weight_check import Fault, Limits, WeightCheck, check
 
 FAULTS = [(fault.name, fault.name.replace("_", " ").title(), f"Vertices {fault.value}") for fault in Fault]
 

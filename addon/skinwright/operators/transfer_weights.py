@@ -5,9 +5,9 @@ from bpy.props import BoolProperty
 from bpy.types import Context, Event, Object
 
 from .. import native, preferences
+from ..settings import TransferOptions
 from ..reporting import Report
 from ..scene.error import SceneError
-from ..settings import TransferOptions
 from ..transfer import TransferParams, steps, transfer_weights
 from .modal.long_work import LongWork
 

@@ -6,8 +6,8 @@ from bpy.props import EnumProperty
 from bpy.types import Context, Operator
 from numpy.typing import NDArray
 
-from ... import native
 from ...match import session as match_session
+from ... import native
 from ...scene import mask, mesh
 from ...scene.error import SceneError
 from .preview import begin, refusal, target

@@ -4,8 +4,8 @@ import bpy
 from bpy.props import EnumProperty
 from bpy.types import Context, Object, Operator
 
-from ... import native, preferences
 from ...match import session as match_session
+from ... import native, preferences
 from ...match.session import MatchSession
 from ...scene import attributes, mesh
 from ...scene.error import SceneError
