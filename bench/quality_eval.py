@@ -45,6 +45,7 @@ def main() -> None:
     parser.add_argument("--split-seams", action="store_true", help="transfer to the garments as they are imported")
     parser.add_argument("--no-penetration", action="store_true", help="leave out the slowest figure")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "quality_results.md")
+    parser.add_argument("--json", type=Path, help="write all figures here as well")
     options = parser.parse_args()
     start, folder = time.perf_counter(), data_folder()
     cases = read_cases(folder, options.only)
@@ -57,7 +58,8 @@ def main() -> None:
         print(f"{time.perf_counter() - start:5.0f} s  {case.name}", flush=True)
     text = table.report(cases, results) + "\n## Every garment\n\n" + table.per_garment(results)
     options.out.write_text("# Transferred weights against the artists'\n\n" + text)
-    options.out.with_suffix(".json").write_text(json.dumps(results, indent=1))
+    if options.json:
+        options.json.write_text(json.dumps(results, indent=1))
     print(text)
     draw_worst(cases, results, weights, list(Poses.read(folder).poses), options.out.with_suffix(".png"))
 

@@ -1,58 +1,69 @@
-"""Packs the add-on and its native module into the zip that Blender installs: dist/skinwright-VERSION.zip.
+"""Packs the add-on and its native modules into the zips that Blender installs: dist/skinwright-VERSION-PLATFORM.zip.
 
-Runs in the venv of the Makefile. The wheel is linked against glibc 2.28 through zig where the `ziglang` package is
-there, so that it loads on any Linux that Blender itself supports; without it the zip works only on systems as new as
-this one. Blender's own extension tool, which lies inside the bpy wheel, validates and builds: no executable is needed.
+Takes the newest wheel of each platform from dist/wheels, where `make wheels` puts them; a platform without a wheel gets
+no zip. Blender's own extension tool, which lies inside the bpy wheel, validates and builds: no executable is needed.
+Beside the zips stand their SHA-256 sums.
 """
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
-import os
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from platforms import PLATFORMS, of_wheel
+
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = ROOT / "addon" / "skinwright"
 DIST = ROOT / "dist"
-BINARIES = Path(sys.executable).parent
 
 
 def main() -> None:
-    """Wheel, staged folder, manifest, validation, zip."""
-    DIST.mkdir(exist_ok=True)
+    """Staged folder, manifest, validation, one zip per platform."""
+    wheels = newest_wheels(DIST / "wheels")
+    if not wheels:
+        raise SystemExit("There is no wheel in dist/wheels: run make wheels first.")
     with tempfile.TemporaryDirectory(dir=DIST) as folder:
         staged = Path(folder) / "skinwright"
-        shutil.copytree(ADDON, staged, ignore=shutil.ignore_patterns("__pycache__", "*.pyc", "*.so"))
-        wheel = build_wheel(staged / "wheels")
+        shutil.copytree(ADDON, staged, ignore=shutil.ignore_patterns("__pycache__", "*.pyc", "*.so", "*.pyd"))
+        (staged / "wheels").mkdir()
+        for wheel in wheels:
+            shutil.copy2(wheel, staged / "wheels")
         manifest = staged / "blender_manifest.toml"
-        manifest.write_text(with_wheel(manifest.read_text(), wheel.name))
+        text = manifest.read_text(encoding="utf-8")
+        manifest.write_text(with_wheels(text, [wheel.name for wheel in wheels]), encoding="utf-8")
         run_blender_extension("validate", str(staged))
-        run_blender_extension("build", "--source-dir", str(staged), "--output-dir", str(DIST))
+        run_blender_extension("build", "--split-platforms", "--source-dir", str(staged), "--output-dir", str(DIST))
+    write_sums(sorted(DIST.glob("*.zip")))
+    for name in PLATFORMS.keys() - {of_wheel(wheel.name).name for wheel in wheels}:
+        print(f"{name}: no zip, as dist/wheels has no wheel for it")
     print("Blender keeps an installed native module until the version in Cargo.toml and blender_manifest.toml changes.")
 
 
-def build_wheel(folder: Path) -> Path:
-    """The abi3 wheel, for the oldest glibc that can be had here."""
-    portable = ["--zig", "--compatibility", "manylinux_2_28"]
-    if importlib.util.find_spec("ziglang") is None:
-        print("ziglang is not installed: the zip will run only on systems with a glibc as new as this one's.")
-        portable = []
-    search = {"PATH": f"{BINARIES}{os.pathsep}{os.environ['PATH']}"}
-    command = ["maturin", "build", "--quiet", "--release", *portable, "--out", str(folder)]
-    subprocess.run(command, cwd=ROOT, check=True, env=os.environ | search)
-    (wheel,) = folder.glob("*.whl")
-    return wheel
+def newest_wheels(folder: Path) -> list[Path]:
+    """The newest wheel of each platform, in the order of the table."""
+    found = {}
+    for wheel in sorted(folder.glob("*.whl"), key=lambda wheel: wheel.stat().st_mtime):
+        found[of_wheel(wheel.name).name] = wheel
+    return [found[name] for name in PLATFORMS if name in found]
 
 
-def with_wheel(manifest: str, wheel: str) -> str:
+def with_wheels(manifest: str, wheels: list[str]) -> str:
     """The manifest with the keys that depend on the build, before its first table."""
-    keys = f'platforms = ["linux-x64"]\nwheels = ["./wheels/{wheel}"]\n\n'
+    platforms = ", ".join(f'"{of_wheel(wheel).name}"' for wheel in wheels)
+    files = ", ".join(f'"./wheels/{wheel}"' for wheel in wheels)
     head, table, rest = manifest.partition("[permissions]")
-    return head + keys + table + rest
+    return f"{head}platforms = [{platforms}]\nwheels = [{files}]\n\n{table}{rest}"
+
+
+def write_sums(files: list[Path]) -> None:
+    """SHA256SUMS beside the files, as `sha256sum --check` reads it."""
+    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    (DIST / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")
 
 
 def run_blender_extension(*arguments: str) -> None:

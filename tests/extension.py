@@ -1,6 +1,7 @@
 """Enabling and disabling the add-on as a user would; bpy must be there."""
 
 import importlib
+import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -16,9 +17,17 @@ def enable() -> object:
     folder = Path(next(repo.directory for repo in repos if repo.module == "user_default")) / "skinwright"
     folder.parent.mkdir(parents=True, exist_ok=True)
     if not folder.exists():
-        folder.symlink_to(ROOT / "addon" / "skinwright", target_is_directory=True)
+        _lay_out(ROOT / "addon" / "skinwright", folder)
     addon_utils.enable(PACKAGE, default_set=True)
     return importlib.import_module(PACKAGE)
+
+
+def _lay_out(source: Path, folder: Path) -> None:
+    """A link where the system lets everyone make one, else a copy."""
+    try:
+        folder.symlink_to(source, target_is_directory=True)
+    except (OSError, NotImplementedError):
+        shutil.copytree(source, folder)
 
 
 def disable() -> None:

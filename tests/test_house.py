@@ -14,33 +14,41 @@ ADDON = ROOT / "addon" / "skinwright"
 MODULES = sorted(p.relative_to(ADDON) for p in ADDON.rglob("*.py") if "presets" not in p.relative_to(ADDON).parts)
 
 # ui -> operators (by bl_idname) -> features, settings -> scene, native -> the wheel.
-FLOOR = {"csr", "jobs", "native", "reporting", "scene"}
+FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "scene", "soundness"}
 # A feature may import the floor, and of the other features only these.
 FEATURES = {
     "transfer": set(),
     "match": {"transfer"},
     "desparsify": set(),
     "sculpt": {"desparsify"},
+    "stored": {"transfer"},
     "check": set(),
     "retarget": {"transfer"},
     "refine": set(),
+    "wardrobe": {"transfer"},
 }
 MAY_IMPORT = {
     "csr": set(),
-    "native": {"csr"},
+    "errors": set(),
+    "registration": set(),
+    "declared": {"errors"},
+    "files": {"errors"},
+    "memory": set(),
+    "native": {"csr", "errors", "memory"},
     "reporting": {"csr"},
-    "scene": {"csr"},
-    "jobs": {"csr", "native"},
+    "soundness": {"csr", "errors"},
+    "scene": {"csr", "errors", "soundness"},
+    "jobs": {"csr", "errors", "native"},
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
-    "settings": set(FEATURES),
-    "preferences": {"native"},
-    "overlay": FLOOR | {"match", "transfer"},
-    "operators": FLOOR | set(FEATURES) | {"settings", "preferences"},
-    "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings"},
+    "settings": {"declared", "errors"} | set(FEATURES),
+    "preferences": {"declared", "native", "registration", "settings"},
+    "overlay": FLOOR | {"check", "match", "stored", "transfer"},
+    "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
+    "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},
     "headless": FLOOR | set(FEATURES),
     "__init__": {"headless", "operators", "overlay", "preferences", "settings", "scene", "ui"},
 }
-NEVER_SEES_BPY = {"csr", "native", "reporting"}
+NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "memory", "native", "reporting", "soundness"}
 MAY_SEE_THE_WHEEL = {"native"}
 
 
@@ -117,6 +125,8 @@ def test_no_integer_of_the_platforms_size(module):
 def test_versions_are_equal():
     version = toml("Cargo.toml")["workspace"]["package"]["version"]
     assert toml("addon/skinwright/blender_manifest.toml")["version"] == version
+    named = toml("Cargo.toml")["workspace"]["dependencies"]
+    assert {named[f"skinwright-{crate}"]["version"] for crate in ("core", "solve")} == {version}
     for crate in ("core", "native", "solve"):
         assert toml(f"rust/{crate}/Cargo.toml")["package"]["version"] == {"workspace": True}
     assert toml("pyproject.toml")["project"].get("version", version) == version

@@ -3,16 +3,16 @@
 import sys
 import time
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import bpy
 
 from . import native
-from .csr import Rows
 
 T = TypeVar("T")
 # Each job that is yielded is answered with its result.
-Jobs = Generator[native.Job, tuple[Any, Rows], T]
+Jobs = Generator["native.Job | Step", Any, T]
 
 # What the panel shows the progress of.
 running: "Runner | None" = None
@@ -20,15 +20,29 @@ running: "Runner | None" = None
 _QUIET_SECONDS = 1.0
 
 
+@dataclass(frozen=True)
+class Step:
+    """A pause in Python's own work, yielded in place of a job: the window lives on, and Esc can stop it here."""
+
+    progress: float
+    done: bool = True
+
+    def cancel(self) -> None:
+        """There is nothing going on."""
+
+    def result(self) -> None:
+        """There is nothing to answer."""
+
+
 class Runner:
     """Work under way; `result` is there once `done`. Poll it from one place."""
 
     def __init__(self, steps: Jobs[Any]) -> None:
         self._steps = steps
-        self._job: native.Job | None = None
+        self._job: native.Job | Step | None = None
         self.done = False
         self.result: Any = None
-        self._send(None)
+        self._advance(lambda: next(steps))
 
     @property
     def progress(self) -> float:
@@ -54,17 +68,18 @@ class Runner:
         self._steps.close()
         self.done = True
 
-    def _answer(self, job: native.Job) -> None:
+    def _answer(self, job: native.Job | Step) -> None:
         try:
             answer = job.result()
-        except native.NativeError:
-            self._steps.close()
-            raise
-        self._send(answer)
+        except native.NativeError as error:
+            sentence = error  # the steps may go on without it
+            self._advance(lambda: self._steps.throw(sentence))
+            return
+        self._advance(lambda: self._steps.send(answer))
 
-    def _send(self, answer: Any) -> None:
+    def _advance(self, step: Callable[[], native.Job | Step]) -> None:
         try:
-            self._job = self._steps.send(answer)
+            self._job = step()
         except StopIteration as end:
             self._job, self.done, self.result = None, True, end.value
 
@@ -74,8 +89,8 @@ def wait(steps: Jobs[T]) -> T:
     runner, started = Runner(steps), time.perf_counter()
     watch = _print_progress() if bpy.app.background else None
     while not runner.poll():
-        # Short work is not made to wait for the next look at it.
-        time.sleep(min(0.1, 0.0005 + 0.02 * (time.perf_counter() - started)))
+        # Short work is not made to wait for the next look at it, nor are steps of Python's own.
+        runner.wait(min(0.1, 0.0005 + 0.02 * (time.perf_counter() - started)))
         if watch:
             watch(runner.progress)
     return runner.result

@@ -1,10 +1,28 @@
 """The add-on's preferences, and whether its native module can be used."""
 
-import bpy
-from bpy.props import IntProperty
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
 from bpy.types import AddonPreferences, Context
 
-from . import native
+from . import declared, native
+from .registration import registration
+from .settings.properties import properties
+
+
+@dataclass(frozen=True)
+class Preferences(declared.Params):
+    """What holds for this machine rather than for a file."""
+
+    threads: int = declared.threads()
+    memory_share: float = declared.setting(
+        native.memory_share,
+        "Memory",
+        "The part of the free memory that one calculation may take; larger ones are refused with their estimate",
+        least=0.05,
+        most=1,
+        unit="FACTOR",
+    )
 
 
 class SKINWRIGHT_AP_preferences(AddonPreferences):
@@ -12,36 +30,30 @@ class SKINWRIGHT_AP_preferences(AddonPreferences):
 
     bl_idname = __package__
 
-    threads: IntProperty(
-        name="Threads",
-        description="Processor threads a calculation may take; 0 takes all",
-        default=0,
-        min=0,
-        soft_max=64,
-        max=1024,
-    )
+    __annotations__ = properties(Preferences)
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The properties, which mypy cannot see."""
 
     def draw(self, _context: Context) -> None:
         """Settings first, then the state of the native module."""
         self.layout.use_property_split = True
         self.layout.prop(self, "threads")
+        self.layout.prop(self, "memory_share", slider=True)
         problem = native.problem()
         row = self.layout.row()
         row.alert = bool(problem)
         row.label(text=problem or f"Native module {native.addon_version()}", icon="ERROR" if problem else "CHECKMARK")
 
 
-def threads(context: bpy.types.Context) -> int:
-    """The preference, or all where the add-on runs without being enabled."""
+def threads(context: Context) -> int:
+    """The preference, or all where the add-on runs without being enabled. The memory's is put in force as well."""
     addon = context.preferences.addons.get(__package__)
-    return addon.preferences.threads if addon and addon.preferences else 0
+    if not addon or not addon.preferences:
+        return 0
+    native.memory_share = addon.preferences.memory_share
+    return addon.preferences.threads
 
 
-def register() -> None:
-    """Register the preferences."""
-    bpy.utils.register_class(SKINWRIGHT_AP_preferences)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    bpy.utils.unregister_class(SKINWRIGHT_AP_preferences)
+register, unregister = registration(SKINWRIGHT_AP_preferences)

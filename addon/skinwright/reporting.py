@@ -1,5 +1,6 @@
 """What has been done, as a sentence with counts, as warnings, and as JSON."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ class GarmentReport:
     locked_groups: list[str]
     kept_groups: list[str]
     armature_added: bool
+    bound_in_pose: bool
     seconds: dict[str, float]
     native: dict[str, Any]
     warnings: list[str] = field(default_factory=list)
@@ -25,11 +27,17 @@ class GarmentReport:
 
 @dataclass
 class Report:
-    """All targets of one transfer."""
+    """All targets of one transfer.
+
+    `failures` are the sentences of those that were left out; `comparison` has the faults in test poses, by target,
+    before and after.
+    """
 
     source: str
     garments: list[GarmentReport]
     warnings: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+    comparison: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
@@ -41,31 +49,52 @@ class Report:
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
         if loose:
             counts.append(f"{loose} loose parts")
+        bound = [garment.target for garment in self.garments if garment.bound_in_pose]
+        if bound:
+            counts.append(f"{', '.join(bound)} bound in the pose")
         created = sum(len(garment.created_groups) for garment in self.garments)
         seconds = sum(sum(garment.seconds.values()) for garment in self.garments)
         groups = f"{self._sum('groups')} groups written, {created} of them new"
-        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s"
+        compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
+        return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)
 
     def all_warnings(self) -> list[str]:
         """Sentences worth a look, the body's first."""
-        return self.warnings + [warning for garment in self.garments for warning in garment.warnings]
+        left_out = [f"Left out: {sentence}" for sentence in self.failures]
+        return left_out + self.warnings + [warning for garment in self.garments for warning in garment.warnings]
 
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         garments = [_plain(vars(garment)) for garment in self.garments]
-        return {"source": self.source, "garments": garments, "warnings": self.warnings, "sentence": self.sentence()}
+        said = {
+            "warnings": self.warnings,
+            "failures": self.failures,
+            "comparison": self.comparison,
+            "sentence": self.sentence(),
+        }
+        return {"source": self.source, "garments": garments} | said
+
+
+def _before_and_after(figures: dict[str, Any]) -> str:
+    """The faults in test poses, as "torn 38 before, 2 after"."""
+    before, after = figures["before"], figures["after"]
+    if before is None:
+        return "in test poses: " + ", ".join(f"{count} {fault}" for fault, count in after.items())
+    return "in test poses: " + ", ".join(f"{fault} {before[fault]} before, {after[fault]} after" for fault in after)
 
 
 def _plain(value: Any) -> Any:
-    """The same with numpy's scalars and arrays as Python's."""
+    """The same with numpy's scalars and arrays as Python's; JSON has no numbers that are not finite, so None."""
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
-    return value.tolist() if hasattr(value, "tolist") else value
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,12 @@ from typing import Any
 
 import igl
 import numpy as np
-import scipy.sparse as sp
 
 from .characters import File, Mesh, Skeleton, joined, welded
 from .poses import Poses, skinned
 
 ARTISTS = ("artist", "mh_helper")
 """References that somebody painted; the others were bound by a program."""
-
-MOST_COPIES = 1e-6
 
 
 def data_folder() -> Path:
@@ -178,8 +175,3 @@ def _garments(folder: Path, body: Body, entry: dict[str, Any]) -> list[Case]:
         name = entry["id"] if len(meshes) == 1 else f"{entry['id']}:{mesh.name}"
         found.append(Case(name, entry["reference"], body, one, mesh, artist))
     return found
-
-
-def dense(weights: sp.spmatrix | np.ndarray) -> np.ndarray:
-    """Weights (V, B) as an array."""
-    return weights if isinstance(weights, np.ndarray) else weights.toarray()

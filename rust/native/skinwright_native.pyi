@@ -14,6 +14,9 @@ MatchMethod = Literal["paper", "confidence"]
 SmallIslands = Literal["auto", "rigid", "solved"]
 
 def version() -> str: ...
+def set_memory_budget(bytes: int | None) -> None:
+    """Bytes that one piece of work may take, None for whatever the machine has; what would take more is refused with a
+    MemoryError that states the estimate."""
 
 class SkinwrightError(ValueError): ...
 class NothingMatched(SkinwrightError): ...
@@ -189,12 +192,12 @@ def fill(
     weld: ArrayLike | None = None,
     threads: int = 0,
 ) -> NDArray[np.float64]:
-    """Values at all vertices (V, C) from values at some: minimises the sum over columns of w'(S + length^2 S M^-1 S)w plus
-    b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
+    """Values at all vertices (V, C) from values at some: minimises, summed over the columns,
+    w'(S + length^2 S M^-1 S)w plus b |w - s|^2 of every soft vertex. NaN where nothing known is connected to a vertex.
 
     `positions` (V, 3), `triangles` (T, 3); `kinds` (V,): 0 free, 1 fixed, 2 soft; `rows` (V, C): the known values;
-    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution; `weld` (V,):
-    for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
+    `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution;
+    `weld` (V,): for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
     """
 
 def linear_blend(
@@ -205,6 +208,22 @@ def linear_blend(
     `rest_positions` (V, 3) and `pose_from_rest` (B, 4, 4) row-major are in the mesh' own space; for Blender,
     pose_from_rest = object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world. The sum of the matrices
     times the weights is divided by the weights' sum; a vertex whose weights sum to no more than 0.0001 stays.
+    """
+
+def penetration(
+    body_positions: ArrayLike,
+    body_triangles: ArrayLike,
+    body_weights: Weights,
+    positions: ArrayLike,
+    weights: Weights,
+    pose_from_rest: ArrayLike,
+    *,
+    threads: int = 0,
+) -> NDArray[np.float32]:
+    """Depths (P, n) of a garment's vertices (n) below the closest triangle of a body, 0 outside, in each of P poses.
+
+    `body_positions` (V, 3) and `positions` (n, 3) are at rest, in world units; `body_triangles` (T, 3) wind so that
+    their normals face outward. `pose_from_rest` (P * B, 4, 4) has the B bones' matrices, one pose after the other.
     """
 
 def desparsify(

@@ -1,6 +1,8 @@
 """The method `confidence` against brute force in NumPy and SciPy, and what no rotation, scale or order may change."""
 
 import json
+import re
+from pathlib import Path
 
 import confidence_oracle
 import numpy as np
@@ -246,6 +248,20 @@ def test_a_garment_far_away_still_gets_rows():
     answer = native_source(*source).transfer(cloth + np.array([0, 3, 0]), faces, method="confidence")
     assert answer.report["unmatched_islands"] == []
     np.testing.assert_allclose(dense(answer).sum(axis=1), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("setting", "literal"),
+    [("method", "MatchMethod"), ("small_islands", "SmallIslands"), ("island_policy", "IslandPolicy")],
+)
+def test_the_stub_names_every_variant(setting, literal):
+    """The refusal lists the core's variants."""
+    stub = Path(__file__).resolve().parents[2] / "rust" / "native" / "skinwright_native.pyi"
+    (listed,) = re.findall(rf"^{literal} = Literal\[(.*)\]$", stub.read_text(), re.MULTILINE)
+    source, target = tubes()
+    with pytest.raises(native.SkinwrightError) as refused:
+        native_source(*source).transfer(*target, **{setting: "none of them"})
+    assert str(refused.value).endswith("must be one of " + listed.replace('"', ""))
 
 
 def test_unknown_names_are_refused():

@@ -70,7 +70,9 @@ def test_raw_weights_equal_the_oracle(case):
         angle[i], rows[i] = tied.angle[chosen], tied.rows[chosen]
     assert differs.mean() < 0.05
 
-    expected = (np.where(moved, prepared.distance, matching.distance) <= max_distance) & ((angle <= THETA) | (np.pi - angle <= THETA))
+    expected = (np.where(moved, prepared.distance, matching.distance) <= max_distance) & (
+        (angle <= THETA) | (np.pi - angle <= THETA)
+    )
     undecided = np.abs(prepared.distance / max_distance - 1) < 1e-6
     undecided |= (np.abs(angle - THETA) < 1e-5) | (np.abs(np.pi - angle - THETA) < 1e-5)
     assert np.array_equal(matched[~undecided], expected[~undecided])

@@ -79,7 +79,10 @@ def test_a_cut_garment_gets_the_bits_of_the_whole_one(cut, settings):
         islands = [{**island, "vertices": 0, "first_vertex": 0} for island in report["unmatched_islands"]]
         assert islands == [{**island, "vertices": 0, "first_vertex": 0} for island in expected["unmatched_islands"]]
         for island in report["unmatched_islands"]:
-            members = np.flatnonzero(native.Inpainting(source, apart, faces).islands == native.Inpainting(source, apart, faces).islands[island["first_vertex"]])
+            members = np.flatnonzero(
+                native.Inpainting(source, apart, faces).islands
+                == native.Inpainting(source, apart, faces).islands[island["first_vertex"]]
+            )
             assert island["vertices"] == len(members) and island["first_vertex"] == members[0]
 
 
@@ -145,7 +148,9 @@ def test_a_double_sided_card_keeps_its_normal():
     # Quads that are cut along the other diagonal on their back.
     n = 15
     corner = (np.arange(n - 1)[None] + n * np.arange(n - 1)[:, None]).ravel()
-    back = np.vstack([np.stack([corner, corner + n, corner + 1], 1), np.stack([corner + 1, corner + n, corner + n + 1], 1)])
+    back = np.vstack(
+        [np.stack([corner, corner + n, corner + 1], 1), np.stack([corner + 1, corner + n, corner + n + 1], 1)]
+    )
     other = source.transfer(twice, np.vstack([faces, back + len(card)]))
     assert other.matched.mean() > 0.7 and (np.diff(other.weights.indptr) > 0).all()
 

@@ -110,3 +110,25 @@ def test_without_keyframes_or_armature_it_says_so(garment):
     garment.modifiers.clear()
     with pytest.raises(RuntimeError, match="no armature"):
         bpy.ops.skinwright.check_weights()
+
+
+def test_a_report_never_costs_a_file(garment, tmp_path):
+    blend, other = tmp_path / "open.blend", tmp_path / "other.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    other.write_text('{"mine": 1}')
+    before = blend.read_bytes()
+    with pytest.raises(RuntimeError, match="used twice"):
+        bpy.ops.skinwright.check_weights(filepath=str(blend), overwrite=True)
+    with pytest.raises(RuntimeError, match="is not a report"):
+        bpy.ops.skinwright.check_weights(filepath=str(other))
+    assert blend.read_bytes() == before and other.read_text() == '{"mine": 1}'
+    bpy.ops.skinwright.check_weights(filepath=str(other), overwrite=True)
+    assert len(check(tmp_path)["poses"]) == len(check(tmp_path)["poses"])  # our own is replaced
+
+
+def test_the_limit_is_that_of_the_transfer(garment, tmp_path):
+    garment.vertex_groups["Left"].add(range(121), 0.5, "REPLACE")
+    garment.vertex_groups["Right"].add(range(121), 0.5, "REPLACE")
+    for limit, found in ((0, 0), (1, 121), (2, 0)):
+        bpy.context.scene.skinwright.transfer.max_influences = limit
+        assert check(tmp_path)["faults"]["over_limit"]["vertices"] == found

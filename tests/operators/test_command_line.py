@@ -183,6 +183,75 @@ class TestInThisProcess:
         assert transfer("--source", "Body", "--target", "Coat", "--settings", path) == 1
         assert "max_distance is -1" in capsys.readouterr().err
 
+    @pytest.mark.parametrize("value", ["NaN", "Infinity", "-Infinity", "2", "-0.1", "1e300", "9" * 400])
+    @pytest.mark.parametrize("groups", ["BONE_DEFORM", "ALL"])
+    def test_a_mix_beyond_its_range_is_refused(self, transfer, coat, tmp_path, capsys, value, groups):
+        path = tmp_path / "settings.json"
+        path.write_text(f'{{"mix_factor": {value}, "groups": "{groups}"}}')
+        before = builders.weights(coat)
+        assert transfer("--source", "Body", "--target", "Coat", "--settings", path) == 1
+        assert transfer("--source", "Body", "--target", "Coat", f"--mix-factor={value}", "--groups", groups) == 1
+        assert capsys.readouterr().err.count("mix_factor is ") == 2
+        assert builders.weights(coat) == before
+
+    def test_an_operator_refuses_it_too(self, coat):
+        before = builders.weights(coat)
+        with pytest.raises(RuntimeError, match="mix_factor is nan, but must lie between 0 and 1"):
+            bpy.ops.skinwright.transfer_weights(mix_factor=float("nan"), groups="ALL")
+        assert builders.weights(coat) == before
+
+    @pytest.mark.parametrize("threads", ["-1", "99999999999999999999", "100000", "1e9", "x", "9" * 5000])
+    def test_threads_beyond_their_range(self, transfer, coat, capsys, threads):
+        assert transfer("--source", "Body", "--target", "Coat", "--threads", threads) in (1, 2)
+        error = capsys.readouterr().err
+        assert "threads" in error and "Traceback" not in error
+
+    @pytest.mark.parametrize("text", ["[" * 100_000, '{"mask": {"invert": true}}', '{"a": ' + "9" * 5000 + "}", "\x00"])
+    def test_junk_in_settings_is_a_sentence(self, transfer, coat, tmp_path, capsys, text):
+        path = tmp_path / "settings.json"
+        path.write_text(text)
+        assert transfer("--source", "Body", "--target", "Coat", "--settings", path) == 2
+        error = capsys.readouterr().err
+        assert "--settings" in error and "Traceback" not in error
+
+    def test_every_setting_is_an_argument_too(self, transfer, coat, tmp_path):
+        report = tmp_path / "report.json"
+        arguments = ["--max-influences", 1, "--max-normal-angle", 20, "--match-flipped-normals", "false"]
+        assert transfer("--source", "Body", "--target", "Coat", *arguments, "--report", report) == 0
+        settings = json.loads(report.read_text())["settings"]
+        assert (settings["max_influences"], settings["match_flipped_normals"]) == (1, False)
+        assert settings["max_normal_angle"] == pytest.approx(20)
+
+    def test_no_output_costs_an_input(self, transfer, blend, tmp_path, capsys):
+        """Not the file that is opened, not the settings, not the other output."""
+        settings = tmp_path / "settings.json"
+        settings.write_text("{}")
+        job = (blend, "--source", "Body", "--target", "Coat", "--settings", settings)
+        before = blend.read_bytes()
+        for outputs in (
+            ["--report", blend],
+            ["--report", blend, "--overwrite"],
+            ["--report", settings],
+            ["--save", settings, "--overwrite"],
+            ["--save", blend],
+            ["--save", tmp_path / "x", "--report", tmp_path / "x"],
+            ["--save", tmp_path / "x", "--report", tmp_path / "x", "--overwrite"],
+        ):
+            assert transfer(*job, *outputs) == 1, outputs
+            assert "skinwright: " in capsys.readouterr().err
+            assert blend.read_bytes() == before and settings.read_text() == "{}"
+            assert not (tmp_path / "x").exists()
+        assert transfer(*job, "--save", blend, "--overwrite") == 0
+        assert builders.dense(loaded(blend, "Coat"), BONES).sum(1) == pytest.approx(1, abs=1e-6)
+
+    def test_the_open_file_is_an_input(self, transfer, coat, tmp_path):
+        path = tmp_path / "open.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        before = path.read_bytes()
+        for output in ("--report", "--save"):
+            assert transfer("--source", "Body", "--target", "Coat", output, path) == 1
+        assert path.read_bytes() == before
+
     def test_settings_go_through_json_unchanged(self, addon):
         params = addon.transfer.TransferParams(
             max_distance=0.25, mask=addon.transfer.Mask("Mask", "PAINTED", invert=True), island_policy="rigid"

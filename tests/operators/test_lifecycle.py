@@ -1,7 +1,9 @@
 """Enabling, disabling and enabling again leaves no trace; what is registered keeps Blender's rules."""
 
+import dataclasses
 from pathlib import Path
 
+import builders
 import extension
 import pytest
 
@@ -85,33 +87,70 @@ def test_names_and_descriptions(addon):
 def test_panel_and_operator_have_the_same_settings(addon):
     operator = bpy.ops.skinwright.transfer_weights.get_rna_type().properties
     panel = bpy.context.scene.skinwright.transfer.bl_rna.properties
-    for name in addon.settings.TransferOptions.__annotations__:
+    for name in addon.settings.TransferSettings.__annotations__:
         pair = operator[name], panel[name]
         assert len({prop.type for prop in pair}) == len({prop.description for prop in pair}) == 1
         assert pair[0].default == pair[1].default
 
 
-def test_defaults_are_the_librarys(addon, scene):
-    """A fresh panel and a call without settings ask for the same."""
-    assert scene.skinwright.transfer.to_params() == addon.transfer.TransferParams(
-        max_normal_angle=pytest.approx(addon.transfer.TransferParams().max_normal_angle),
-        relative_max_distance=pytest.approx(0.05),
-        relative_smoothness_length=pytest.approx(0.05),
-        smoothing_factor=pytest.approx(0.2),
-    )
+ENGINES = {"Unity_4": 4, "Unreal_8": 8, "glTF_4": 4, "VRChat_4": 4}
 
 
-def test_shipped_presets_set_what_they_say(addon, scene):
-    """Each preset sets the same settings, so that changing presets leaves nothing of the last one."""
+def presets():
+    """Path of every preset that comes with the extension, by its name."""
     (folder,) = map(Path, bpy.utils.preset_paths("skinwright/transfer_weights"))
-    presets = sorted(folder.glob("*.py"))
-    assert len(presets) == 5
+    return {path.stem: path for path in sorted(folder.glob("*.py"))}
+
+
+def execute_preset(path):
+    bpy.ops.script.execute_preset(filepath=str(path), menu_idname="SKINWRIGHT_PT_transfer_presets")
+
+
+def test_garment_presets_set_what_they_say(addon, scene):
+    """Each sets the same settings, so that changing presets leaves nothing of the last one."""
+    garments = {name: path for name, path in presets().items() if name not in {*ENGINES, "Default"}}
+    assert len(garments) == 5
     seen = set()
-    for preset in presets:
+    for preset in garments.values():
         names = tuple(line.split("=")[0] for line in preset.read_text().splitlines() if line.startswith("settings."))
-        bpy.ops.script.execute_preset(filepath=str(preset), menu_idname="SKINWRIGHT_PT_transfer_presets")
+        execute_preset(preset)
         seen.add((names, scene.skinwright.transfer.to_params()))
     assert len(seen) == 5 and len({names for names, _ in seen}) == 1
+
+
+def test_engine_presets_set_the_limit_and_nothing_else(addon, scene):
+    execute_preset(presets()["Skirt_or_dress"])
+    before = scene.skinwright.transfer.to_params()
+    for name, limit in ENGINES.items():
+        execute_preset(presets()[name])
+        assert scene.skinwright.transfer.to_params() == dataclasses.replace(before, max_influences=limit)
+
+
+def test_the_default_preset_and_reset_leave_nothing_set(addon, scene):
+    settings = scene.skinwright.transfer
+    settings.source = body = builders.body()
+    for way in (lambda: execute_preset(presets()["Default"]), bpy.ops.skinwright.reset_settings):
+        execute_preset(presets()["Skirt_or_dress"])
+        settings.max_influences, settings.mix_factor, settings.distance_mode = 3, 0.5, "ABSOLUTE"
+        way()
+        assert not any(settings.is_property_set(name) for name in addon.settings.TransferSettings.__annotations__)
+        assert settings.source == body
+
+
+def test_the_settings_last_used_are_the_panels(addon, scene):
+    """As after F9: preview, mask and check ask for what the weights were made with."""
+    settings = scene.skinwright.transfer
+    settings.source, settings.mix_factor = builders.body(), 0.5
+    coat = builders.grid("Coat", 9, z=0.02)
+    builders.select(coat)
+    bpy.ops.skinwright.transfer_weights(max_influences=1, island_policy="RIGID")
+    assert (settings.max_influences, settings.island_policy) == (1, "RIGID")
+    assert settings.mix_factor == 0.5  # was not given
+    coat.location.z = 50
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError):
+        bpy.ops.skinwright.transfer_weights(max_influences=7)
+    assert settings.max_influences == 1  # refused means unchanged
 
 
 def test_saving_and_removing_a_preset(addon, scene):

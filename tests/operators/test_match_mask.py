@@ -72,7 +72,7 @@ def test_the_mask_decides(coat, session):
 def test_confidence_is_graded_and_coloured(coat, session):
     transfer = bpy.context.scene.skinwright.transfer
     assert session.match(params()).confidence is None
-    transfer.method = "CONFIDENCE"
+    transfer.method = "confidence"
     match = session.match(params())
     z = session.garment.geometry.positions[:, 2]
     sheet = z < 0.6
@@ -96,7 +96,7 @@ def test_confidence_is_graded_and_coloured(coat, session):
 
 
 def test_the_mask_decides_with_confidence_too(coat, session):
-    bpy.context.scene.skinwright.transfer.method = "CONFIDENCE"
+    bpy.context.scene.skinwright.transfer.method = "confidence"
     coat.skinwright.mask_group = "Match Mask"
     builders.paint(coat, **{"Match Mask": [0.0] * 9 + [0.5] * 72 + [1.0] * 3})
     session.read_mask(coat)
@@ -254,3 +254,39 @@ class TestPainting:
         after = builders.weights(coat)
         assert [row["Arm.L"] for row in after] == [row["Arm.L"] for row in before]
         painting.cancel(bpy.context)
+
+
+class TestRefusedMeansUnchanged:
+    """No group, no mask, no overlay, no traceback."""
+
+    def test_from_match_with_a_source_without_faces(self, scene, coat):
+        scene.skinwright.transfer.source.data.clear_geometry()
+        before = [group.name for group in coat.vertex_groups], coat.skinwright.mask_group
+        with pytest.raises(RuntimeError, match="has no (faces|vertex groups)"):
+            bpy.ops.skinwright.edit_match_mask(action="FROM_MATCH")
+        assert ([group.name for group in coat.vertex_groups], coat.skinwright.mask_group) == before
+
+    def test_from_match_in_edit_mode_without_a_source(self, scene, coat):
+        scene.skinwright.transfer.source = None
+        bpy.ops.object.mode_set(mode="EDIT")
+        with pytest.raises(RuntimeError, match="There is no source to match"):
+            bpy.ops.skinwright.edit_match_mask(action="FROM_MATCH")
+        assert bpy.context.mode == "EDIT_MESH"
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert not coat.skinwright.mask_group
+
+    def test_selecting_in_what_is_hidden(self, coat):
+        coat.hide_viewport = True
+        with pytest.raises(RuntimeError, match="Coat is hidden"):
+            bpy.ops.skinwright.select_match()
+
+    def test_a_write_that_breaks(self, addon, coat, monkeypatch):
+        before = [group.name for group in coat.vertex_groups], coat.skinwright.mask_group
+
+        def broken(*_arguments):
+            raise KeyError("x")
+
+        monkeypatch.setattr(addon.scene.mask, "write", broken)
+        with pytest.raises(RuntimeError, match="Internal error .KeyError: 'x'."):
+            bpy.ops.skinwright.edit_match_mask(action="CLEAR")
+        assert ([group.name for group in coat.vertex_groups], coat.skinwright.mask_group) == before

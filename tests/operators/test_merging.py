@@ -43,48 +43,66 @@ def weights(draw, normalised):
     return dense.astype(np.float32)
 
 
-def merged_one_vertex(new, old, locked, factor, limit):
+def scaled(row, total):
+    return row / row.sum() * total if row.sum() else row
+
+
+def merged_one_vertex(new, old, held, chosen, factor, limit):
     """The rule for a vertex, said again as plainly as can be."""
     if not new.any():
         return np.zeros(B)
-    remainder = max(1 - old[locked].sum(), 0)
-    row = np.where(locked, 0, new)
-    row = row / row.sum() * remainder if row.sum() else row
-    if not row.any():
-        row = np.where(locked, 0, old)
-        row = row / row.sum() * remainder if row.sum() else row
-    elif factor < 1:
-        row = factor * row + (1 - factor) * np.where(locked, 0, old)
-        row = row / row.sum() * remainder if row.sum() else row
+    remainder = max(1 - old[held].sum(), 0)
+    free = np.where(held, 0, old)
+    if chosen[~held].all():
+        row = scaled(np.where(held, 0, new), remainder)
+        if not row.any():
+            row = scaled(free, remainder)
+        elif factor < 1:
+            row = scaled(factor * row + (1 - factor) * free, remainder)
+    else:
+        mixed = factor * np.where(held, 0, new) + (1 - factor) * free
+        row, others = np.where(chosen, mixed, 0), np.where(chosen, 0, free)
+        if others.any():
+            share = min(row.sum(), remainder)
+            row = scaled(row, share) + scaled(others, remainder - share)
+        else:
+            row = scaled(row, remainder)
     if limit:
-        most = max(limit - (old[locked] > 0).sum(), 0)
+        most = max(limit - (old[held] > 0).sum(), 0)
         order = sorted(range(B), key=lambda bone: (-row[bone], bone))
         row[order[most:]] = 0
-        row = row / row.sum() * remainder if row.sum() else row
+        row = scaled(row, remainder)
     return row
+
+
+BOOLEANS = st.lists(st.booleans(), min_size=B, max_size=B)
 
 
 @RELAXED
 @given(
     new=weights(True),
     old=weights(False),
-    locks=st.lists(st.booleans(), min_size=B, max_size=B),
+    locks=BOOLEANS,
+    wanted=st.one_of(st.just([True] * B), BOOLEANS),
     factor=st.sampled_from([1.0, 0.5, 0.25, 0.0]),
     limit=st.integers(0, 4),
 )
-def test_merge_against_brute_force(merging, csr, new, old, locks, factor, limit):
-    locked = np.array(locks)
-    old[:, locked] /= np.maximum(old[:, locked].sum(1, keepdims=True), 1) * 1.01
-    rows = merging.merge(rows_of(csr, new), rows_of(csr, old), locked=locked, factor=factor, max_influences=limit)
-    expected = [merged_one_vertex(*pair, locked, factor, limit) for pair in zip(new, old, strict=True)]
+def test_merge_against_brute_force(merging, csr, new, old, locks, wanted, factor, limit):
+    held, chosen = np.array(locks), np.array(wanted)
+    old[:, held] /= np.maximum(old[:, held].sum(1, keepdims=True), 1) * 1.01
+    rows = merging.merge(
+        rows_of(csr, new), rows_of(csr, old), held=held, chosen=chosen, factor=factor, max_influences=limit
+    )
+    expected = [merged_one_vertex(*pair, held, chosen, factor, limit) for pair in zip(new, old, strict=True)]
     assert dense_of(csr, rows) == pytest.approx(np.array(expected), abs=2e-6)
 
 
 def test_merge_changes_no_bit_without_locks_or_mixing_to_do(merging, csr):
     """A vertex whose locked weights are 0 is scaled by its own sum only."""
     new = np.array([[0.25, 0.75, 0, 0, 0, 0]], np.float32)
+    none = np.zeros(B, bool)
     rows = merging.merge(
-        rows_of(csr, new), rows_of(csr, new * 0), locked=np.zeros(B, bool), factor=1.0, max_influences=0
+        rows_of(csr, new), rows_of(csr, new * 0), held=none, chosen=~none, factor=1.0, max_influences=0
     )
     assert rows.values.tolist() == [0.25, 0.75]
 

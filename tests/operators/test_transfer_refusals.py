@@ -287,9 +287,13 @@ class TestWarnings:
         assert "is posed" in self.warnings(plain(body, coat))
         assert self.warnings(plain(body, coat)) == "", "the coat has the armature now"
 
-    def test_several_armatures(self, plain, body, coat):
-        body.modifiers.new("Second", "ARMATURE").object = builders.rig("Second")
-        assert "Body has 2 armatures; Rig was taken" in self.warnings(plain(body, coat))
+    def test_several_armatures_are_all_used(self, plain, body, coat):
+        second = builders.rig("Second", bones=("pin",))
+        body.modifiers.new("Second", "ARMATURE").object = second
+        assert "armature" not in self.warnings(plain(body, coat))
+        assert [m.object for m in coat.modifiers] == [bpy.data.objects["Rig"], second]
+        assert builders.dense(coat, [*BONES, "pin"]).sum(1) == pytest.approx(1, abs=1e-6)
+        assert builders.dense(coat, ["pin"]).any()
 
     def test_bones_missing_on_the_targets_armature(self, plain, body, coat):
         other = builders.rig("Other", bones=("Arm.L",))

@@ -89,58 +89,6 @@ def test_rest_ignores_modifiers_pose_and_shape_keys(mesh):
     assert mesh.read(obj).positions[:, 2] == pytest.approx(0)
 
 
-def test_evaluated_follows_pose_and_shape_keys(mesh):
-    obj = builders.grid("Garment", 3)
-    obj.shape_key_add(name="Basis")
-    key = obj.shape_key_add(name="Up")
-    for point in key.data:
-        point.co.z += 1
-    key.value = 0.5
-    armature = builders.rig(bones=("a",))
-    builders.paint(obj, a=1.0)
-    modifier = obj.modifiers.new("Armature", "ARMATURE")
-    modifier.object = armature
-    armature.pose.bones["a"].location = (0, 2, 0)
-    bpy.context.view_layer.update()
-    assert mesh.read(obj, evaluated=True).positions[:, 2] == pytest.approx(2.5)
-
-
-@pytest.mark.parametrize("kind", ["SUBSURF", "MIRROR", "SOLIDIFY", "ARRAY", "NODES", "DECIMATE", "MASK"])
-def test_evaluated_keeps_the_original_vertices(mesh, kind):
-    """Modifiers that change the topology are switched off for the reading, and are on again afterwards."""
-    obj = builders.grid("Garment", 4)
-    displace = obj.modifiers.new("Displace", "DISPLACE")
-    displace.strength, displace.mid_level = 1, 0
-    modifier = obj.modifiers.new("Changes", kind)
-    off = obj.modifiers.new("Off", "SUBSURF")
-    off.show_viewport = False
-    geometry = mesh.read(obj, evaluated=True)
-    assert len(geometry.positions) == 16
-    assert geometry.positions[:, 2] == pytest.approx(1)
-    assert modifier.show_viewport and not off.show_viewport
-
-
-@pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
-def test_what_is_not_evaluated_has_no_current_shape(mesh, scene_error, hidden):
-    obj = builders.grid("Garment", 3)
-    if hidden == "hide_viewport":
-        obj.hide_viewport = True
-    else:
-        bpy.context.collection.objects.unlink(obj)
-    bpy.context.view_layer.update()
-    with pytest.raises(scene_error, match="Garment is disabled or excluded"):
-        mesh.read(obj, evaluated=True)
-    assert len(mesh.read(obj).positions) == 9
-
-
-def test_hidden_by_the_eye_still_has_a_current_shape(mesh):
-    obj = builders.grid("Garment", 3)
-    modifier = obj.modifiers.new("Displace", "DISPLACE")
-    modifier.strength, modifier.mid_level = 1, 0
-    obj.hide_set(True)
-    assert mesh.read(obj, evaluated=True).positions[:, 2] == pytest.approx(1)
-
-
 def test_scale_of_zero_is_refused(mesh, scene_error):
     obj = builders.grid("Garment", 3)
     obj.scale.y = 0

@@ -1,6 +1,5 @@
 """What is wrong with a mesh's weights: in the numbers, and in test poses."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -9,14 +8,23 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import csr
-from ..scene import armature, depth, mesh, poses, vertex_groups
+from .. import csr, jobs, native
+from ..jobs import Jobs
+from ..scene import armature, mesh, places, poses, shapes, skeleton, vertex_groups
 from ..scene.error import SceneError
+from . import body_plan
+from .params import CheckParams
+from .poses import TestPose, range_of_motion, whole_body
 
 SUM_TOLERANCE = 1e-4
 # An edge longer by less than this part of the mesh's diagonal is no offender, however short it was.
 _LEAST_LENGTHENING = 0.005
+# Of the diagonal: vertices at one place, and what a gap between them is.
+_ONE_PLACE = 1e-6
+_GAP = 5e-4
 _MOST_POINTS = 4000
+# Poses between two looks at the window: a few hundredths of a second.
+_AT_ONCE = 4
 
 
 class Fault(Enum):
@@ -27,40 +35,40 @@ class Fault(Enum):
     OVER_LIMIT = "over the limit of bones"
     STRETCHED = "on stretched edges"
     TORN = "on torn edges"
+    OPEN = "at one place at rest and apart in a pose"
     PENETRATING = "deeper in the body than at rest"
 
 
-@dataclass(frozen=True)
-class Limits:
-    """`stretched` and `torn` are lengths over lengths at rest; `deeper` a part of the body's diagonal; radians."""
-
-    max_influences: int = 4
-    stretched: float = 2.0
-    torn: float = 4.0
-    deeper: float = 0.005
-    poses: str = "RANGE"
-    angle: float = np.pi / 4
-    most_frames: int = 40
+# From bad to worse, to find the worst pose.
+_IN_POSES = {Fault.STRETCHED: 1, Fault.PENETRATING: 2, Fault.TORN: 10, Fault.OPEN: 10}
 
 
 @dataclass
 class WeightCheck:
-    """`faulty` (V,) by fault; `poses` holds the counts in every pose."""
+    """`faulty` (V,) by fault; `poses` holds the counts in every pose; `tested` says what was done."""
 
     target: str
     vertices: int
     faulty: dict[Fault, NDArray[np.bool_]]
     poses: list[dict[str, Any]] = field(default_factory=list)
+    tested: str = ""
+    worst: TestPose | None = None
+    bones: list[str] = field(default_factory=list)
 
     def counts(self) -> dict[Fault, int]:
         """Vertices by fault."""
         return {fault: int(marked.sum()) for fault, marked in self.faulty.items()}
 
+    def any_fault(self) -> NDArray[np.bool_]:
+        """(V,) the vertices with any fault."""
+        return np.logical_or.reduce(list(self.faulty.values()))
+
     def sentence(self) -> str:
         """The line the artist reads."""
         found = [f"{count} {fault.value}" for fault, count in self.counts().items() if count]
-        tested = f"{len(self.poses)} poses tested"
-        return f"{self.target}: {', '.join(found) or 'nothing wrong'} of {self.vertices} vertices; {tested}"
+        worst = f"; the worst is {self.worst.name}" if self.worst else ""
+        wrong = f"{', '.join(found) or 'nothing wrong'} of {self.vertices} vertices"
+        return f"{self.target}: {wrong}; {len(self.poses)} poses tested ({self.tested}){worst}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain values only; with the first vertices of each fault."""
@@ -68,20 +76,27 @@ class WeightCheck:
             fault.name.lower(): {"vertices": int(marked.sum()), "first": np.flatnonzero(marked)[:100].tolist()}
             for fault, marked in self.faulty.items()
         }
-        return {"target": self.target, "vertices": self.vertices, "faults": faults, "poses": self.poses}
+        said = {"tested": self.tested, "worst": self.worst.name if self.worst else ""}
+        return {"target": self.target, "vertices": self.vertices, "faults": faults, "poses": self.poses} | said
 
 
-def check(target: bpy.types.Object, body: bpy.types.Object | None, limits: Limits) -> WeightCheck:
-    """Look at the weights, then at each pose. Raises SceneError; the pose and the frame are restored."""
-    rig = armature.find(target)
-    if rig is None:
+def check(target: bpy.types.Object, source: bpy.types.Object | None, params: CheckParams) -> WeightCheck:
+    """Look at the weights, then at each pose. Raises SceneError; nothing in the scene changes."""
+    return jobs.wait(steps(target, source, params))
+
+
+def steps(target: bpy.types.Object, source: bpy.types.Object | None, params: CheckParams) -> Jobs[WeightCheck]:
+    """The same as a generator of jobs, for a window that must live on meanwhile."""
+    rigs = armature.rigs(target) or [rig for rig in [armature.find(target)] if rig]
+    if not rigs:
         raise SceneError(f"{target.name} has no armature to pose it: give it an Armature modifier")
-    deforming = armature.deform_bones(rig)
-    names = [group.name for group in target.vertex_groups if group.name in deforming]
-    rows = vertex_groups.read(target, names)
-    result = WeightCheck(target.name, len(rows.indptr) - 1, faults_of_rows(rows, limits.max_influences))
-    used = [names[bone] for bone in np.unique(rows.bones[rows.values > 0]).tolist()]
-    _check_poses(result, _Garment(target, body, rig, limits), used)
+    bones = skeleton.read(rigs)
+    garment = _Posable(target, source, bones, params)
+    faulty = faults_of_rows(garment.rows, params.max_influences)
+    result = WeightCheck(target.name, len(garment.rest), faulty, bones=bones.names)
+    used = np.unique(garment.rows.bones[garment.rows.values > 0]).tolist()
+    result.tested, tests = _tests(rigs, bones, used, params)
+    yield from _check_poses(result, garment, tests)
     return result
 
 
@@ -96,64 +111,114 @@ def faults_of_rows(rows: csr.Rows, max_influences: int) -> dict[Fault, NDArray[n
     }
 
 
-class _Garment:
-    """The shapes at rest, and the sampled points whose depth in the body is compared."""
+def _tests(
+    rigs: list[bpy.types.Object], bones: skeleton.Skeleton, used: list[int], params: CheckParams
+) -> tuple[str, list[TestPose]]:
+    """What is tested, in words, and the poses."""
+    if params.poses in ("ACTION", "MARKERS", "LIBRARY"):
+        of_the_artist = {"ACTION": poses.keyframes, "MARKERS": poses.marked_frames, "LIBRARY": poses.library}
+        shown = of_the_artist[params.poses](rigs[0], params.most_frames)
+        words = {"ACTION": "keyframes", "MARKERS": "marked frames", "LIBRARY": "pose library"}
+        return words[params.poses], [TestPose(name, armature.world_pose(rigs, bones.names)) for name in shown]
+    bends = list(range_of_motion(bones, used, params.angle)) if params.poses != "BODY" else []
+    body = list(whole_body(bones, body_plan.find(bones))) if params.poses != "RANGE" else []
+    if not body and params.poses == "BODY":
+        raise SceneError(
+            f"The names of the bones of {rigs[0].name} do not tell which are limbs: choose Range of Motion or Keyframes"
+        )
+    words = [word for word, tests in (("range of motion", bends), ("whole body", body)) if tests]
+    return f"{' and '.join(words) or 'no bone has weight'}; deform bones alone, blended linearly", bends + body
+
+
+class _Posable:
+    """The target's shape at rest with its weights, and the sampled points whose depth in the source is compared."""
 
     def __init__(
-        self, target: bpy.types.Object, body: bpy.types.Object | None, rig: bpy.types.Object, limits: Limits
+        self,
+        target: bpy.types.Object,
+        source: bpy.types.Object | None,
+        bones: skeleton.Skeleton,
+        params: CheckParams,
     ) -> None:
-        self.target, self.body, self.rig, self.limits = target, body, rig, limits
+        self.name, self.params = target.name, params
         self.edges = mesh.edges(target)
-        with poses.at_rest(rig):
-            self.rest = mesh.read(target, evaluated=True)
-            self.lengths = _lengths(self.rest.positions, self.edges)
-            n = len(self.rest.positions)
-            self.sampled = np.unique(np.linspace(0, n - 1, min(n, _MOST_POINTS)).astype(int))
-            self.depth = self.depth_now(self.rest)
+        objects = [target] if source is None else [target, source]
+        with shapes.looked_at(objects, "AS_SHOWN"):
+            geometry = shapes.read_target(target, "AS_SHOWN").geometry
+            self.body = None if source is None or source == target else _body(source, bones)
+        self.rest = geometry.positions
+        self.rows = vertex_groups.read(target, bones.names)
+        self.diagonal = float(np.linalg.norm(geometry.size))
+        self.lengths = _lengths(self.rest, self.edges)
+        self.first = places.first_at_each(self.rest, _ONE_PLACE * self.diagonal)
+        self.doubled = np.flatnonzero(self.first != np.arange(len(self.rest), dtype=np.int64))
+        n = len(self.rest)
+        self.sampled = np.unique(np.linspace(0, n - 1, min(n, _MOST_POINTS)).astype(np.int64))
+        rest = np.tile(np.eye(4), (1, len(bones.names), 1, 1))
+        self.depth = self.depths(rest)[0]
 
-    def depth_now(self, shape: mesh.Geometry) -> NDArray[np.float32]:
-        """(P,) of the sampled points, 0 without a body."""
-        if self.body is None:
-            return np.zeros(len(self.sampled), np.float32)
-        return depth.inside(shape.positions[self.sampled], mesh.read(self.body, evaluated=True))
+    def depths(self, matrices: NDArray[np.float64]) -> NDArray[np.float32]:
+        """(P, n) of the sampled points in poses (P, B, 4, 4); without a source 0."""
+        if self.body is None or not matrices.shape[1]:
+            return np.zeros((len(matrices), len(self.sampled)), np.float32)
+        geometry, rows = self.body
+        points = (self.rest[self.sampled], csr.take_rows(self.rows, self.sampled))
+        return native.penetration(self.name, (geometry.positions, geometry.triangles, rows), points, matrices)
 
-    def pose_names(self, bones: list[str]) -> Iterator[str]:
-        """Puts the armature into pose after pose."""
-        if self.limits.poses == "ACTION":
-            return poses.keyframes(self.rig, self.limits.most_frames)
-        return poses.range_of_motion(self.rig, bones, self.limits.angle)
-
-    def faults_now(self) -> dict[Fault, NDArray[np.bool_]]:
-        """(V,) what the pose that is shown now does."""
-        shape = mesh.read(self.target, evaluated=True)
-        lengths, diagonal = _lengths(shape.positions, self.edges), float(np.linalg.norm(self.rest.size))
-        ratio = np.where(
-            lengths - self.lengths > _LEAST_LENGTHENING * diagonal, lengths / np.maximum(self.lengths, 1e-30), 1.0
-        )
-        deeper = self.depth_now(shape) - self.depth > self.limits.deeper * diagonal
-        penetrating = np.zeros(len(shape.positions), bool)
-        penetrating[self.sampled[deeper]] = True
-        torn = ratio > self.limits.torn
+    def faults_in(self, pose: TestPose, depths: NDArray[np.float32]) -> dict[Fault, NDArray[np.bool_]]:
+        """(V,) what a pose does; `depths` (n,) are those of the sampled points in it."""
+        now = native.linear_blend(self.name, self.rest, self.rows, pose.pose_from_rest)
+        lengths = _lengths(now, self.edges)
+        longer = lengths - self.lengths > _LEAST_LENGTHENING * self.diagonal
+        ratio = np.where(longer, lengths / np.maximum(self.lengths, 1e-30), 1.0)
+        torn = ratio > self.params.torn
         return {
-            Fault.STRETCHED: self._ends((ratio > self.limits.stretched) & ~torn),
+            Fault.STRETCHED: self._ends((ratio > self.params.stretched) & ~torn),
             Fault.TORN: self._ends(torn),
-            Fault.PENETRATING: penetrating,
+            Fault.OPEN: self._open(now),
+            Fault.PENETRATING: self._penetrating(depths),
         }
 
+    def _open(self, now: NDArray[np.float32]) -> NDArray[np.bool_]:
+        marked = np.zeros(len(now), bool)
+        gap = np.linalg.norm(now[self.doubled] - now[self.first[self.doubled]], axis=1)
+        apart = self.doubled[gap > _GAP * self.diagonal]
+        marked[apart] = marked[self.first[apart]] = True
+        return marked
+
+    def _penetrating(self, depths: NDArray[np.float32]) -> NDArray[np.bool_]:
+        marked = np.zeros(len(self.rest), bool)
+        marked[self.sampled[depths - self.depth > self.params.deeper * self.diagonal]] = True
+        return marked
+
     def _ends(self, edge: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        marked = np.zeros(len(self.rest.positions), bool)
+        marked = np.zeros(len(self.rest), bool)
         marked[self.edges[edge].ravel()] = True
         return marked
 
 
-def _check_poses(result: WeightCheck, garment: _Garment, bones: list[str]) -> None:
-    for fault in (Fault.STRETCHED, Fault.TORN, Fault.PENETRATING):
+def _body(source: bpy.types.Object, bones: skeleton.Skeleton) -> tuple[mesh.Geometry, csr.Rows]:
+    shape, rows = shapes.read_source(source, "AS_SHOWN", bones.names)
+    return shape.geometry, rows
+
+
+def _check_poses(result: WeightCheck, garment: _Posable, tests: list[TestPose]) -> Jobs[None]:
+    for fault in _IN_POSES:
         result.faulty[fault] = np.zeros(result.vertices, bool)
-    for name in garment.pose_names(bones):
-        now = garment.faults_now()
-        result.poses.append({"pose": name} | {fault.name.lower(): int(marked.sum()) for fault, marked in now.items()})
-        for fault, marked in now.items():
-            result.faulty[fault] |= marked
+    most = 0
+    for start in range(0, len(tests), _AT_ONCE):
+        some = tests[start : start + _AT_ONCE]
+        depths = garment.depths(np.stack([pose.pose_from_rest for pose in some]))
+        for pose, depth in zip(some, depths, strict=True):
+            now = garment.faults_in(pose, depth)
+            counts = {fault: int(marked.sum()) for fault, marked in now.items()}
+            result.poses.append({"pose": pose.name} | {f.name.lower(): count for f, count in counts.items()})
+            badness = sum(_IN_POSES[fault] * count for fault, count in counts.items())
+            if badness > most:
+                most, result.worst = badness, pose
+            for fault, marked in now.items():
+                result.faulty[fault] |= marked
+        yield jobs.Step(min(1.0, (start + _AT_ONCE) / len(tests)))
 
 
 def _lengths(positions: NDArray[np.float32], edges: NDArray[np.int32]) -> NDArray[np.float32]:

@@ -1,42 +1,72 @@
-"""Desparsification: every vertex gets bones to choose from, as members of weight 0 (spec-sculpt, section 5)."""
+"""Desparsification: every vertex gets bones to choose from, as members of weight 0."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import csr, native
+from .. import csr, native, soundness
 from ..csr import Rows
+from ..declared import native_keywords
 from ..reporting import DesparsifyReport
-from ..scene import armature, mesh, sculpting, vertex_groups
+from ..scene import armature, mesh, sculpting, vertex_groups, weight_state
 from ..scene.error import SceneError
+from .params import DesparsifyParams
+
+__all__ = ["DesparsifyParams", "desparsify", "desparsify_all"]
 
 
 @dataclass(frozen=True)
-class DesparsifyParams:
-    """`n` members a vertex, found by `method` (see the native stub); `threads` 0 takes all."""
+class _Answer:
+    """The rows of `vertices` over `names`, before and after."""
 
-    n: int = 4
-    method: Literal["surface", "hop"] = "surface"
-    selected_only: bool = False
-    threads: int = 0
+    names: list[str]
+    vertices: NDArray[np.intp]
+    before: Rows
+    after: Rows
 
 
 def desparsify(obj: bpy.types.Object, params: DesparsifyParams) -> DesparsifyReport:
-    """Give vertices of `obj` exactly n deforming bones: the largest they have, and near ones at weight 0.
+    """Give vertices of a mesh exactly n deforming bones: the largest they have, and near ones at weight 0.
 
-    Locked groups and groups that are no deforming bones stay as they are. Nothing is written if an error is raised.
+    Locked groups and groups that are not deforming bones stay as they are. Nothing is written if an error is raised.
     Raises SceneError and native.NativeError.
     """
+    return desparsify_all([obj], params)[0]
+
+
+def desparsify_all(
+    objects: Sequence[bpy.types.Object],
+    params: DesparsifyParams,
+    before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
+) -> list[DesparsifyReport]:
+    """The same for several meshes: all are computed before the first is written, and all are written or none.
+
+    `before_write` is told when writing begins.
+    """
+    answers = [_compute(obj, params) for obj in objects]
+    if before_write:
+        before_write(objects)
+    with weight_state.all_or_nothing(objects):
+        return [_write(obj, answer, params.n) for obj, answer in zip(objects, answers, strict=True)]
+
+
+def _compute(obj: bpy.types.Object, params: DesparsifyParams) -> _Answer:
     rig = _check(obj)
     names = [bone.name for bone in rig.data.bones]
     deforming = np.isin(names, sorted(armature.deform_bones(rig)))
     before = csr.keep_columns(vertex_groups.read(obj, names), deforming)
     after = _solve(obj, rig, names, deforming, before, params)
-    vertices = np.flatnonzero(mesh.selected(obj)) if params.selected_only else np.arange(len(obj.data.vertices), dtype=np.int64)
-    return _write(obj, names, vertices, before, after, params.n)
+    vertices = (
+        np.flatnonzero(mesh.selected(obj))
+        if params.selected_only
+        else np.arange(len(obj.data.vertices), dtype=np.int64)
+    )
+    free = deforming & ~np.isin(names, sorted(vertex_groups.locked(obj)))
+    soundness.check_sums(obj.name, after, free)
+    return _Answer(names, vertices, csr.take_rows(before, vertices), csr.take_rows(after, vertices))
 
 
 def _check(obj: bpy.types.Object) -> bpy.types.Object:
@@ -64,14 +94,12 @@ def _solve(
         shape["positions"], shape["triangles"] = mesh.rest_positions(obj.data), mesh.triangles(obj)
         shape["bone_segments"] = armature.segments(obj, rig, names)
     parents = armature.parents(rig, names)
-    options = {"n": params.n, "method": params.method, "locked": locked, "threads": params.threads}
-    return native.desparsify(obj.name, before, len(names), parents, **options, **shape)
+    keywords = native_keywords(params) | {"locked": locked} | shape
+    return native.desparsify(obj.name, before, len(names), parents, **keywords)
 
 
-def _write(
-    obj: bpy.types.Object, names: list[str], vertices: NDArray[np.intp], before: Rows, after: Rows, n: int
-) -> DesparsifyReport:
-    before, after = csr.take_rows(before, vertices), csr.take_rows(after, vertices)
+def _write(obj: bpy.types.Object, answer: _Answer, n: int) -> DesparsifyReport:
+    names, vertices, before, after = answer.names, answer.vertices, answer.before, answer.after
     present = {group.name for group in obj.vertex_groups}
     used = np.isin(np.arange(len(names), dtype=np.int64), np.concatenate([before.bones, after.bones]))
     needed = [name for name, is_used in zip(names, used, strict=True) if is_used]

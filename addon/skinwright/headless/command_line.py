@@ -1,4 +1,4 @@
-"""Work without a window: `blender -c skinwright transfer ...` or `sculpt ...`, and the scripts of the same names.
+"""Work without a window: `blender -c skinwright COMMAND ...`, and the scripts of the same names.
 
 Exit codes: 0 done, 1 failed (the sentence is on stderr), 2 wrong usage.
 """
@@ -6,24 +6,28 @@ Exit codes: 0 done, 1 failed (the sentence is on stderr), 2 wrong usage.
 import argparse
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from .. import native
+from .. import declared, files, native
+from ..declared import SettingError
+from ..errors import Refused, internal
 from ..reporting import Report, SculptReport
-from ..scene.error import SceneError
-from ..sculpt.replay import options_from_json, read, replay
-from ..sculpt.session import SculptOptions
-from ..transfer import TransferParams, from_json, to_json, transfer_weights
+from ..scene import blend_file
+from ..scene.blend_file import mesh_named, object_named
+from ..sculpt.params import SculptParams, options_from_json
+from ..sculpt.replay import read, replay
+from ..transfer import TransferParams, from_json, transfer_weights
+from . import wardrobe as wardrobe_command
+from . import weights as weights_command
 
 DONE, FAILED, USAGE = 0, 1, 2
-Params = TransferParams | SculptOptions
+Params = TransferParams | SculptParams
 
 
-class _Failure(Exception):
+class _Failure(Refused):
     """A sentence for stderr, with exit code 1."""
 
 
@@ -34,6 +38,8 @@ def main(arguments: list[str]) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
+    _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
+    _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
     return _run(parser, arguments)
 
 
@@ -53,42 +59,76 @@ def sculpt(arguments: list[str]) -> int:
     return _run(parser, arguments)
 
 
+def wardrobe(arguments: list[str]) -> int:
+    """The same without the word `wardrobe`, for the script."""
+    parser = argparse.ArgumentParser(prog="wardrobe.py", description="Transfer many garments to many bodies.")
+    _add_wardrobe(parser)
+    return _run(parser, arguments)
+
+
+def weights(arguments: list[str]) -> int:
+    """The same without the word `weights`, for the script."""
+    parser = argparse.ArgumentParser(prog="weights.py", description="Keep, bring back, compare weights.")
+    _add_weights(parser)
+    return _run(parser, arguments)
+
+
 def _add_transfer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
     parser.add_argument("--target", required=True, action="append", help="object to transfer to; may be repeated")
-    _add_common(parser, "max_normal_angle in degrees", to_json(TransferParams()))
-    parser.set_defaults(work=_transfer, read=from_json, write=to_json, default=TransferParams())
+    _add_common(parser, TransferParams())
+    parser.set_defaults(work=_transfer, read=from_json, inputs=("settings",))
 
 
 def _add_sculpt(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--target", required=True, help="object that was sculpted")
     parser.add_argument("--sculpts", required=True, type=Path, help=".npz file of positions and poses")
-    _add_common(parser, "names as in SculptOptions", vars(SculptOptions()))
-    parser.set_defaults(work=_sculpt, read=options_from_json, write=vars, default=SculptOptions())
+    _add_common(parser, SculptParams())
+    parser.set_defaults(work=_sculpt, read=options_from_json, inputs=("settings", "sculpts"))
 
 
-def _add_common(parser: argparse.ArgumentParser, settings: str, defaults: dict[str, Any]) -> None:
-    listed = ", ".join(f"{name} {json.dumps(value)}" for name, value in defaults.items())
-    parser.epilog = f"Settings and their defaults: {listed}."
-    parser.add_argument("--settings", type=Path, help=f"JSON object of settings; {settings}")
-    parser.add_argument("--threads", type=int, help="processor threads, 0 for all")
+def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
+    wardrobe_command.add(parser)
+    parser.set_defaults(run=wardrobe_command.run)
+
+
+def _add_weights(parser: argparse.ArgumentParser) -> None:
+    weights_command.add(parser)
+    parser.set_defaults(run=weights_command.run)
+
+
+def _add_common(parser: argparse.ArgumentParser, default: Params) -> None:
+    listed = ", ".join(f"{name} {json.dumps(value)}" for name, value in declared.to_json(default).items())
+    parser.epilog = f"Settings and their defaults, angles in degrees: {listed}."
+    parser.add_argument("--settings", type=Path, help="JSON object of settings")
     parser.add_argument("--report", type=Path, help="write what was done as JSON")
     parser.add_argument("--save", type=Path, help="save the result as this .blend file")
+    parser.add_argument("--overwrite", action="store_true", help="let outputs replace any file that exists")
+    group = parser.add_argument_group("settings, each also a name in the file of --settings, which they overrule")
+    for name, (kind, one) in declared.declared(type(default)).items():
+        if declared.is_plain(kind):
+            sentence = declared.described(kind, one, getattr(default, name)).replace("%", "%%")
+            group.add_argument(f"--{name.replace('_', '-')}", metavar="VALUE", dest=f"set {name}", help=sentence)
 
 
 def _run(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
+    """The net under every command: whatever happens comes to a sentence on stderr and an exit code."""
     try:
         options = parser.parse_args(arguments)
+        if hasattr(options, "run"):
+            return options.run(options)
         params = _params(parser, options)
-    except SystemExit as leave:  # argparse has said what is wrong; a host application must not be ended by it
-        return leave.code if isinstance(leave.code, int) else USAGE
-    try:
         report = _work(options, params)
         _write_report(options, params, report)
-    except (_Failure, SceneError, native.NativeError, OSError) as error:
+    except SystemExit as leave:  # argparse has said what is wrong; a host application must not be ended by it
+        return leave.code if isinstance(leave.code, int) else USAGE
+    except (Refused, OSError) as error:
         print(f"skinwright: {error}", file=sys.stderr)
+        return FAILED
+    except Exception as error:
+        print(f"skinwright: {internal(error)}", file=sys.stderr)
         return FAILED
     for warning in report.all_warnings():
         print(f"skinwright: warning: {warning}", file=sys.stderr)
@@ -98,62 +138,75 @@ def _run(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
 
 def _params(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Params:
     try:
-        params = options.read(json.loads(options.settings.read_text())) if options.settings else options.default
-    except (OSError, ValueError) as error:
-        parser.error(f"--settings {options.settings}: {error}")
-    return params if options.threads is None else replace(params, threads=options.threads)
+        settings = _settings_of(options)
+        return options.read(settings)
+    except SettingError as error:
+        raise _Failure(f"{_origin(options)}{error}") from error
+    except (OSError, ValueError, RecursionError) as error:
+        problem = "it is nested too deeply" if isinstance(error, RecursionError) else error
+        parser.error(f"{_origin(options)}{problem}")
+
+
+def _origin(options: argparse.Namespace) -> str:
+    return f"--settings {options.settings}: " if options.settings else ""
+
+
+def _settings_of(options: argparse.Namespace) -> Any:
+    """Those of the file, overruled by those of the command line."""
+    settings = json.loads(options.settings.read_text(encoding="utf-8")) if options.settings else {}
+    given = {name.removeprefix("set "): text for name, text in vars(options).items() if name.startswith("set ")}
+    given = {name: _value(text) for name, text in given.items() if text is not None}
+    return settings | given if given and isinstance(settings, dict) else settings
+
+
+def _value(text: str) -> Any:
+    """A number, true, false or null as JSON writes it; everything else is a text."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
 
 
 def _work(options: argparse.Namespace, params: Params) -> Report | SculptReport:
     if native.problem():
         raise _Failure(native.problem())
+    _check_outputs(options)
     if options.blend:
-        _open(options.blend)
+        blend_file.open_file(options.blend)
     report = options.work(options, params)
     if options.save:
-        _save(options.save)
+        blend_file.save_copy(options.save)
     return report
 
 
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Before anything is done: no output may cost a file."""
+    inputs = [path for name in options.inputs if (path := getattr(options, name))]
+    blends = [options.blend] if options.blend else blend_file.opened()
+    if options.report:
+        others = [*inputs, *blends, *([options.save] if options.save else [])]
+        files.check_output(options.report, others=others, overwrite=options.overwrite, replaces=files.REPORT)
+    if options.save:  # also over the file that was opened, but only if asked to
+        files.check_output(options.save, others=inputs, overwrite=options.overwrite)
+
+
 def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
-    return transfer_weights(bpy.context, _object(options.source), [_object(n) for n in options.target], params)
+    return transfer_weights(
+        bpy.context, object_named(options.source), [object_named(n) for n in options.target], params
+    )
 
 
-def _sculpt(options: argparse.Namespace, params: SculptOptions) -> SculptReport:
-    return replay(_object(options.target), read(options.sculpts), params)
-
-
-def _open(blend: Path) -> None:
-    if not blend.is_file():
-        raise _Failure(f"there is no file {blend}")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(blend.resolve()), load_ui=False)
-    except RuntimeError as error:
-        raise _Failure(f"{blend} cannot be opened: {error}") from error
-
-
-def _save(path: Path) -> None:
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), copy=True, check_existing=False)
-    except RuntimeError as error:
-        raise _Failure(f"{path} cannot be saved: {error}") from error
-
-
-def _object(name: str) -> bpy.types.Object:
-    obj = bpy.data.objects.get(name)
-    if obj is None:
-        raise _Failure(f"there is no object {name}; there are {', '.join(sorted(bpy.data.objects.keys())) or 'none'}")
-    return obj
+def _sculpt(options: argparse.Namespace, params: SculptParams) -> SculptReport:
+    return replay(mesh_named(options.target), read(options.sculpts), params)
 
 
 def _write_report(options: argparse.Namespace, params: Params, report: Report | SculptReport) -> None:
     if options.report:
-        content: dict[str, Any] = {"version": native.addon_version(), "settings": options.write(params)}
-        content |= report.to_json()
-        options.report.write_text(json.dumps(content, indent=2) + "\n")
+        content: dict[str, Any] = {"version": native.addon_version(), "settings": declared.to_json(params)}
+        files.write_report(options.report, content | report.to_json(), overwrite=options.overwrite)
 
 
-_commands: list[object] = []
+_commands: list[object] = []  # what Blender gives back for taking the command away
 
 
 def register() -> None:

@@ -9,13 +9,23 @@ import time
 import bpy
 
 from .. import jobs, native
-from .session import MatchSession
-from ..scene import changes, mask, vertex_groups
+from ..scene import brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.params import TransferParams
+from .session import MatchSession
 
 # A solve this short is waited for: the view would be drawn in between, which takes about as long.
 PATIENCE_SECONDS = 0.4
+
+# What the brush paints into the mask's group.
+BRUSH_WEIGHTS = {"INPAINT": 0.0, "AUTOMATIC": 0.5, "MATCH": 1.0}
+
+
+def brush_value(context: bpy.types.Context) -> str:
+    """Which of BRUSH_WEIGHTS the brush paints now, or nothing for another weight or without a brush."""
+    weight = brush.weight(context)
+    near = (name for name, value in BRUSH_WEIGHTS.items() if weight is not None and abs(weight - value) < 0.01)
+    return next(near, "")
 
 
 class MaskPainting:
@@ -24,7 +34,7 @@ class MaskPainting:
     def __init__(self, context: bpy.types.Context, target: bpy.types.Object, params: TransferParams) -> None:
         """Show the match and go to Weight Paint mode on the mask. Raises SceneError or native.NativeError."""
         settings = context.scene.skinwright
-        self.before = vertex_groups.snapshot(target)
+        self.before = weight_state.capture(target)
         self.mask_group, self.mode, self.overlay = target.skinwright.mask_group, target.mode, settings.overlay.kind
         try:
             group = mask.ensure(target)
@@ -126,5 +136,5 @@ class MaskPainting:
             bpy.ops.object.mode_set(mode=self.mode)
 
     def _restore(self, target: bpy.types.Object) -> None:
-        vertex_groups.restore(target, self.before)
+        weight_state.apply(target, self.before)
         target.skinwright.mask_group = self.mask_group

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import memory
 from ..csr import Rows
+from ..errors import Refused
 
 _module: Any = None
 _import_error = ""
@@ -22,7 +24,7 @@ except ImportError as error:
     _import_error = str(error)
 
 
-class NativeError(ValueError):
+class NativeError(Refused):
     """What the native module answers to inputs it has no answer for: one sentence."""
 
 
@@ -46,6 +48,16 @@ def addon_version() -> str:
     return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
 
 
+# The part of the free memory that one piece of work may take; the preferences set it.
+memory_share = 0.5
+
+
+def _set_budget() -> None:
+    """Before each piece of work, as what is free changes."""
+    free = memory.free_bytes()
+    _module.set_memory_budget(None if free is None else int(free * memory_share))
+
+
 class Source:
     """A body prepared once for any number of garments; `name` is what errors call it."""
 
@@ -58,17 +70,11 @@ class Inpainting:
     """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
 
     def __init__(
-        self,
-        source: Source,
-        name: str,
-        positions: NDArray,
-        triangles: NDArray,
-        method: str = "paper",
-        threads: int = 0,
+        self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0, method: str = "paper"
     ) -> None:
         self.name = name
         with _naming(name):
-            self._inpainting = _module.Inpainting(source._source, positions, triangles, method=method, threads=threads)
+            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads, method=method)
         self.distance: NDArray[np.float32] = self._inpainting.distance
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands
@@ -127,6 +133,32 @@ def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options:
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
 
 
+def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:
+    """(V, 3) where linear blend skinning takes rest positions (V, 3) by matrices (B, 4, 4), all in one space."""
+    with _naming(name):
+        return _module.linear_blend(rest, _module.Weights(*rows, len(pose_from_rest)), pose_from_rest)
+
+
+def penetration(
+    name: str,
+    body: tuple[NDArray, NDArray, Rows],
+    garment: tuple[NDArray, Rows],
+    poses: NDArray,
+) -> NDArray[np.float32]:
+    """(P, n) depths of a garment's vertices inside a body in poses (P, B, 4, 4); arguments as in the stub."""
+    n_bones = poses.shape[1]
+    (positions, triangles, rows), (points, point_rows) = body, garment
+    with _naming(name):
+        return _module.penetration(
+            positions,
+            triangles,
+            _module.Weights(*rows, n_bones),
+            points,
+            _module.Weights(*point_rows, n_bones),
+            poses.reshape(-1, 4, 4),
+        )
+
+
 class SculptSolver:
     """A character prepared for strokes, with its poses, targets and undo; keyword arguments as in the stub."""
 
@@ -168,15 +200,18 @@ class SculptSolver:
 
     def undo(self) -> NDArray[np.uint32] | None:
         """Takes the last stroke back; the vertices it had touched."""
-        return self._solver.undo()
+        with _naming(self.name):
+            return self._solver.undo()
 
     def redo(self) -> NDArray[np.uint32] | None:
         """Does it again; likewise."""
-        return self._solver.redo()
+        with _naming(self.name):
+            return self._solver.redo()
 
     def rows(self, vertices: NDArray | None = None) -> Rows:
         """The present rows of these vertices, or of all."""
-        return _rows(self._solver.weights(vertices))
+        with _naming(self.name):
+            return _rows(self._solver.weights(vertices))
 
     @property
     def stroke_count(self) -> int:
@@ -190,7 +225,8 @@ class SculptSolver:
 
     def rest_residuals(self, pose: int) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """The vertices (n,) sculpted in a pose, and the offsets (n, 3) at rest that weights cannot stand in for."""
-        return self._solver.rest_residuals(pose=pose)
+        with _naming(self.name):
+            return self._solver.rest_residuals(pose=pose)
 
 
 def _rows(weights: Any) -> Rows:
@@ -199,7 +235,13 @@ def _rows(weights: Any) -> Rows:
 
 @contextmanager
 def _naming(name: str) -> Iterator[None]:
+    """What the module raises, a panic of Rust included, as one class whose sentence names the object."""
+    _set_budget()
     try:
         yield
-    except _module.SkinwrightError as error:
+    except (_module.SkinwrightError, MemoryError, OverflowError, RuntimeError) as error:
         raise NativeError(f"{name}: {error}") from error
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise NativeError(f"{name}: internal error in Skinwright, please report it: {error}") from error

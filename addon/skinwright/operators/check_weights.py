@@ -1,95 +1,124 @@
 """Check Weights: what is wrong with the weights of the selected meshes, in numbers and in test poses."""
 
-import json
 from pathlib import Path
 
 import bpy
-import numpy as np
-from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy.types import Context, Operator
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Context, Event
 
-from ..scene import mesh
-from ..scene.error import SceneError
-from ..check.weight_check import Fault, Limits, WeightCheck, check
+from .. import files, jobs
+from ..check import shown
+from ..check.params import CheckParams
+from ..check.weight_check import Fault, WeightCheck, steps
+from ..jobs import Jobs
+from ..registration import registration
+from ..scene import blend_file, mesh
+from ..settings.properties import properties, values
+from .base import SkinwrightOperator, selected_meshes
+from .modal.long_work import LongWork
 
 FAULTS = [(fault.name, fault.name.replace("_", " ").title(), f"Vertices {fault.value}") for fault in Fault]
 
 
-class SKINWRIGHT_OT_check_weights(Operator):
-    """Selects the offenders, so that Edit mode shows them; the pose is as before."""
+class _CheckSettings:
+    """The settings of a check; a mix-in."""
+
+    __annotations__ = properties(CheckParams, ["poses", "angle", "max_influences", "stretched", "torn"])
+
+
+class SKINWRIGHT_OT_check_weights(_CheckSettings, LongWork, SkinwrightOperator):
+    """Nothing changes but, on demand, the selection: the overlay shows the offenders."""
 
     bl_idname = "skinwright.check_weights"
     bl_label = "Check Weights"
-    bl_description = "Put the armature through test poses and select the vertices whose weights do badly"
+    bl_description = "Look at the weights of the selected meshes, in numbers and in test poses"
     bl_options = {"REGISTER", "UNDO"}
 
-    poses: EnumProperty(
-        name="Poses",
-        description="What the armature is put through",
-        items=[
-            ("RANGE", "Range of Motion", "Bend and twist the bones, those equally deep in the hierarchy together"),
-            ("ACTION", "Keyframes", "The frames that have keys in the armature's action"),
-        ],
-    )
-    angle: FloatProperty(
-        name="Angle", description="How far bones are bent", default=np.pi / 4, min=0, max=np.pi, subtype="ANGLE"
-    )
-    max_influences: IntProperty(
-        name="Limit", description="Most bones a vertex may follow; 0 sets no limit", default=4, min=0, soft_max=8
-    )
-    stretched: FloatProperty(
-        name="Stretched", description="Times its length at rest from which an edge is stretched", default=2, min=1
-    )
-    torn: FloatProperty(
-        name="Torn", description="Times its length at rest from which an edge is torn", default=4, min=1
-    )
     select: EnumProperty(
         name="Select",
         description="Which offenders to select",
-        items=[("ALL", "All", "Vertices with any fault"), *FAULTS],
+        items=[
+            ("NONE", "None", "Leave the selection as it is; the overlay Faults shows the offenders"),
+            ("ALL", "All", "Vertices with any fault"),
+            *FAULTS,
+        ],
     )
     filepath: StringProperty(
         name="Report", description="File to write the figures to as JSON; none if empty", subtype="FILE_PATH"
     )
+    overwrite: BoolProperty(
+        name="Overwrite", description="Let the report replace a file that is not a report", default=False
+    )
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        """Cheap, as it runs on every redraw."""
-        meshes = [obj for obj in context.selected_objects if obj.type == "MESH"]
-        cls.poll_message_set("Select the meshes to check, in Object mode")
-        return context.mode == "OBJECT" and bool(meshes)
+    def refusal(cls, context: Context) -> str:
+        """Object mode, and something to check."""
+        if context.mode == "OBJECT" and selected_meshes(context):
+            return ""
+        return "Select the meshes to check, in Object mode"
 
-    def execute(self, context: Context) -> set[str]:
-        """Check each mesh; nothing but the selection changes."""
-        body = context.scene.skinwright.transfer.source
-        limits = Limits(self.max_influences, self.stretched, self.torn, poses=self.poses, angle=self.angle)
-        try:
-            targets = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != body]
-            checks = [check(obj, body, limits) for obj in targets or [context.object]]
-            self._write(checks)
-        except (SceneError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        for result in checks:
-            mesh.select(context.scene.objects[result.target], self._chosen(result))
-            self.report({"WARNING" if any(result.counts().values()) else "INFO"}, result.sentence())
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        """From a button: with a progress bar, and Esc stops it."""
+        return self.attempt(lambda: self.begin(context, self._steps(context)))
+
+    def work(self, context: Context) -> set[str]:
+        """Check each mesh."""
+        return self.complete(context, jobs.wait(self._steps(context)))
+
+    def complete(self, context: Context, result: list[WeightCheck]) -> set[str]:
+        """Keep the results, write the report, and say what was found."""
+        shown.keep(result)
+        if self.filepath:
+            content = [each.to_json() for each in result]
+            files.write_report(self._report_path(), content, others=blend_file.opened(), overwrite=self.overwrite)
+        for each in result:
+            if self.select != "NONE":
+                chosen = each.any_fault() if self.select == "ALL" else each.faulty[Fault[self.select]]
+                mesh.select(context.scene.objects[each.target], chosen)
+            self.report({"WARNING" if any(each.counts().values()) else "INFO"}, each.sentence())
         return {"FINISHED"}
 
-    def _chosen(self, result: WeightCheck):
-        chosen = result.faulty.values() if self.select == "ALL" else [result.faulty[Fault[self.select]]]
-        return np.logical_or.reduce(list(chosen))
-
-    def _write(self, checks: list[WeightCheck]) -> None:
+    def _steps(self, context: Context) -> Jobs[list[WeightCheck]]:
+        """Refuse what can be refused at once; the rest is a generator."""
+        settings = context.scene.skinwright.transfer
+        if not self.properties.is_property_set("max_influences"):
+            self.max_influences = settings.max_influences  # the limit is one setting
+        params = CheckParams(**values(self, CheckParams))
         if self.filepath:
-            content = [result.to_json() for result in checks]
-            Path(bpy.path.abspath(self.filepath)).write_text(json.dumps(content, indent=2) + "\n")
+            files.check_output(
+                self._report_path(), others=blend_file.opened(), overwrite=self.overwrite, replaces=files.REPORT
+            )
+        targets = selected_meshes(context, without=settings.source) or selected_meshes(context)
+        return _one_by_one([(target, settings.source, params) for target in targets])
+
+    def _report_path(self) -> Path:
+        return Path(bpy.path.abspath(self.filepath))
 
 
-def register() -> None:
-    """Register the operator."""
-    bpy.utils.register_class(SKINWRIGHT_OT_check_weights)
+def _one_by_one(inputs: list[tuple]) -> Jobs[list[WeightCheck]]:
+    results = []
+    for each in inputs:
+        results.append((yield from steps(*each)))
+    return results
 
 
-def unregister() -> None:
-    """Unregister it."""
-    bpy.utils.unregister_class(SKINWRIGHT_OT_check_weights)
+class SKINWRIGHT_OT_show_worst_pose(SkinwrightOperator):
+    """Puts the armature into the pose; undo brings the old one back."""
+
+    bl_idname = "skinwright.show_worst_pose"
+    bl_label = "Show Worst Pose"
+    bl_description = "Put the armature into the test pose with the most faults of the active mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def refusal(cls, context: Context) -> str:
+        """A mesh that was checked, with a fault in some pose."""
+        result = shown.of(context.object)
+        return "" if result and result.worst else "Check the weights of the active mesh first"
+
+    def work(self, context: Context) -> set[str]:
+        """Pose it, and name the pose."""
+        return self.tell(f"{context.object.name}: {shown.take_worst_pose(context.object)}", [])
+
+
+register, unregister = registration(SKINWRIGHT_OT_check_weights, SKINWRIGHT_OT_show_worst_pose)

@@ -1,18 +1,16 @@
 """Desparsify Weights: bones to choose from for every vertex of the selected meshes."""
 
-import bpy
-from bpy.types import Context, Object, Operator
+from bpy.types import Context, Object
 
-from .. import native, preferences
-from ..desparsify import desparsify
+from .. import preferences
+from ..desparsify import desparsify_all
+from ..registration import registration
 from ..scene import mesh
-from ..scene.error import SceneError
-from ..settings.sculpt import DesparsifyOptions
-
-MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
+from ..settings.sculpt import DesparsifySettings
+from .base import SkinwrightOperator, refusal_in_mode
 
 
-class SKINWRIGHT_OT_desparsify(DesparsifyOptions, Operator):
+class SKINWRIGHT_OT_desparsify(DesparsifySettings, SkinwrightOperator):
     """The operator; all of the work is in the function it calls."""
 
     bl_idname = "skinwright.desparsify"
@@ -21,25 +19,18 @@ class SKINWRIGHT_OT_desparsify(DesparsifyOptions, Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        """Cheap, as it runs on every redraw."""
-        reason = _refusal(context)
-        cls.poll_message_set(reason)
-        return not reason
+    def refusal(cls, context: Context) -> str:
+        """Modes and targets."""
+        found = refusal_in_mode(context, "desparsify weights")
+        return found or ("" if _targets(context) else "Select the meshes to desparsify")
 
-    def execute(self, context: Context) -> set[str]:
-        """Each mesh by itself; those done stay done where another is refused."""
+    def work(self, context: Context) -> set[str]:
+        """All meshes, or none where one is refused."""
         params = self.to_params(preferences.threads(context))
-        done = False
         with mesh.object_mode(context):
-            for obj in _targets(context):
-                try:
-                    report = desparsify(obj, params)
-                except (SceneError, native.NativeError) as error:
-                    self.report({"WARNING" if done else "ERROR"}, str(error))
-                    return {"FINISHED" if done else "CANCELLED"}
-                self.report({"INFO"}, report.sentence())
-                done = True
+            reports = desparsify_all(_targets(context), params, before_write=self.keep_before)
+        for report in reports:
+            self.report({"INFO"}, report.sentence())
         return {"FINISHED"}
 
 
@@ -51,19 +42,4 @@ def _targets(context: Context) -> list[Object]:
     return first + meshes if context.mode == "OBJECT" else first
 
 
-def _refusal(context: Context) -> str:
-    if native.problem():
-        return native.problem()
-    if context.mode not in MODES:
-        return "Go to Object, Edit or Weight Paint mode to desparsify weights"
-    return "" if _targets(context) else "Select the meshes to desparsify"
-
-
-def register() -> None:
-    """Register the operator."""
-    bpy.utils.register_class(SKINWRIGHT_OT_desparsify)
-
-
-def unregister() -> None:
-    """Unregister it."""
-    bpy.utils.unregister_class(SKINWRIGHT_OT_desparsify)
+register, unregister = registration(SKINWRIGHT_OT_desparsify)

@@ -8,9 +8,9 @@ from bpy.types import SpaceView3D
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
+from . import colours, legend
 from . import picture as preview
 from .picture import Picture
-from . import colours, legend
 
 # Towards the viewer by this part of the depth range, so that the mesh's own faces do not show through.
 DEPTH_OFFSET = 5e-5

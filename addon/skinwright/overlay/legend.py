@@ -11,7 +11,14 @@ from ..match.session import Category
 from . import colours
 from .picture import Histogram, Picture
 
-TITLES = {"MATCH": "Match", "CONFIDENCE": "Confidence", "INFLUENCES": "Influences", "STRETCH": "Stretch"}
+TITLES = {
+    "MATCH": "Match",
+    "CONFIDENCE": "Confidence",
+    "INFLUENCES": "Influences",
+    "STRETCH": "Stretch",
+    "DIFFERENCE": "Difference",
+    "FAULTS": "Faults",
+}
 TEXT = (0.95, 0.95, 0.95, 1.0)
 BACKGROUND = (0.08, 0.08, 0.08, 0.72)
 BARS_BELOW, BARS_ABOVE = (*colours.CATEGORIES[Category.MATCHED], 1.0), (*colours.CATEGORIES[Category.INPAINTED], 1.0)

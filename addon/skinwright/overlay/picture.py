@@ -7,10 +7,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..check import shown as checked
+from ..check.weight_check import Fault, WeightCheck
 from ..csr import Rows
 from ..match import session as match_session
 from ..match.session import Category, Match, MatchSession
 from ..scene import armature, changes, deformation, mesh, vertex_groups
+from ..stored import comparing
 from ..transfer.params import TransferParams
 
 CATEGORY_NAMES = {
@@ -43,7 +46,7 @@ class Histogram:
 
 @dataclass(frozen=True)
 class Picture:
-    """`values` (V,) mean what `kind` says: a category, a confidence, a number of influences, a logarithm of stretch."""
+    """`values` (V,) mean what `kind` says: a category, a confidence, a number of influences, a stretch, a fault."""
 
     kind: str
     object_name: str
@@ -64,7 +67,7 @@ def forget() -> None:
     """Drop what is kept between drawings."""
     global _kept, _triangles
     _kept = _triangles = None
-    match_session.current = None
+    match_session.current = comparing.current = None
 
 
 def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Picture | None:
@@ -75,7 +78,7 @@ def picture(context: bpy.types.Context, kind: str, params: TransferParams) -> Pi
     if obj is None:
         return None
     match = _match(obj, session, params) if session else None
-    key = (kind, obj.name, changes.version, id(match))
+    key = (kind, obj.name, changes.version, id(match), id(comparing.current), id(checked.of(obj)))
     if _kept is None or _kept[0] != key:
         _kept = (key, _make(context, kind, obj, session, match))
     return _kept[1]
@@ -118,8 +121,12 @@ def _make(
     }
     if session and match:
         return _picture_of_match(match, session, shape)
+    if kind == "DIFFERENCE":
+        return _picture_of_difference(obj, shape)
     if kind == "INFLUENCES":
         return _picture_of_influences(obj, shape)
+    if kind == "FAULTS":
+        return _picture_of_faults(checked.of(obj), shape)
     values = deformation.stretch(mesh.edges(obj), mesh.rest_positions(obj.data), positions)
     rows = [(-1, "Half as long"), (0, "As at rest"), (1, "Twice as long")]
     return Picture(**shape, values=values, rows=rows)
@@ -163,6 +170,20 @@ def histogram(label: str, unit: str, values: NDArray, threshold: float, high: fl
     return Histogram(label, unit, counts, high, threshold)
 
 
+def _picture_of_faults(result: WeightCheck | None, shape: dict) -> Picture:
+    """0 for a sound vertex, else the number of its worst fault, from 1."""
+    values = np.zeros(len(shape["positions"]), np.int64)
+    if result is None:
+        return Picture(**shape, values=values, rows=[], note="Check the weights first")
+    rows = [(0, f"Sound: {int((~result.any_fault()).sum()):,}")]
+    for number, fault in enumerate(Fault, 1):
+        values[result.faulty[fault]] = number
+        if result.faulty[fault].any():
+            rows.append((number, f"{fault.name.replace('_', ' ').title()}: {int(result.faulty[fault].sum()):,}"))
+    worst = f"Worst: {result.worst.name}" if result.worst else "No fault in any pose"
+    return Picture(**shape, values=values, rows=rows, note=worst)
+
+
 def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     weights = vertex_groups.read(obj, _bone_names(obj))
     count = influences(weights)
@@ -171,6 +192,17 @@ def _picture_of_influences(obj: bpy.types.Object, shape: dict) -> Picture:
     numbers = np.bincount(np.minimum(count, 5), minlength=6)
     rows = [(n, f"{name}: {numbers[n]:,}") for n, name in enumerate(INFLUENCE_NAMES)]
     return Picture(**shape, values=count, rows=rows, note=note)
+
+
+def _picture_of_difference(obj: bpy.types.Object, shape: dict) -> Picture:
+    """As it was when the weights were compared: comparing takes too long for every drawing."""
+    shown = comparing.current
+    if shown is None or shown.object_name != obj.name or len(shown.difference) != len(shape["positions"]):
+        return Picture(**shape, values=np.zeros(len(shape["positions"])), rows=[(0, "Press Compare Weights")])
+    changed = int((shown.difference > 1e-6).sum())
+    rows: list[tuple[float, str]] = [(0, f"Equal, but for {changed:,} vertices"), (0.5, "Half on other bones")]
+    rows.append((1, "All on other bones"))
+    return Picture(**shape, values=shown.difference, rows=rows)
 
 
 def influences(rows: Rows) -> NDArray[np.int64]:

@@ -1,6 +1,20 @@
 """The only code that touches Blender's data: numpy arrays out, numpy arrays in."""
 
-from . import armature, attributes, changes, corrective, deformation, depth, error, mask, mesh, poses, rest_shape, sculpting, vertex_groups
+from . import (
+    armature,
+    attributes,
+    changes,
+    corrective,
+    deformation,
+    depth,
+    error,
+    mask,
+    mesh,
+    poses,
+    rest_shape,
+    sculpting,
+    vertex_groups,
+)
 
 __all__ = [
     "armature",

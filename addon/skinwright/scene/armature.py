@@ -7,6 +7,16 @@ import numpy as np
 from mathutils import Quaternion
 from numpy.typing import NDArray
 
+# Settings of an Armature modifier that decide what weights do.
+BINDING = (
+    "use_deform_preserve_volume",
+    "use_multi_modifier",
+    "use_vertex_groups",
+    "use_bone_envelopes",
+    "vertex_group",
+    "invert_vertex_group",
+)
+
 
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     """The Armature modifiers that name an armature, the enabled ones first."""
@@ -36,19 +46,84 @@ def selected_bones(armature: bpy.types.Object) -> set[str]:
     return {bone.name for bone in armature.data.bones if bone.select}
 
 
+def rigs(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The armatures that deform `obj`: by its enabled modifiers, or by armature parenting."""
+    found = [m.object for m in obj.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
+    parent = obj.parent
+    if parent and parent.type == "ARMATURE" and obj.parent_type == "ARMATURE":
+        found.append(parent)
+    return list(dict.fromkeys(found))
+
+
+def deformed_meshes(armatures: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The visible meshes that one of these armatures deforms."""
+    objects = bpy.context.view_layer.objects
+    return [o for o in objects if o.type == "MESH" and o.visible_get() and set(rigs(o)) & set(armatures)]
+
+
+def masking_groups(obj: bpy.types.Object) -> set[str]:
+    """The groups that its Armature modifiers are limited to."""
+    return {m.vertex_group for m in modifiers(obj) if m.show_viewport and m.vertex_group}
+
+
+def moving(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Every armature that moves one of these objects: as deformer, as parent or by a constraint."""
+    found: list[bpy.types.Object] = []
+    for obj in objects:
+        ancestor: bpy.types.Object | None = obj
+        while ancestor:
+            found += [rig for rig in (*rigs(ancestor), ancestor.parent) if rig]
+            found += [target for constraint in ancestor.constraints for target in constraint_targets(constraint)]
+            ancestor = ancestor.parent
+    return [rig for rig in dict.fromkeys(found) if rig.type == "ARMATURE"]
+
+
+def constraint_targets(constraint: bpy.types.Constraint) -> list[bpy.types.Object]:
+    """The objects a constraint that is on follows."""
+    if constraint.mute or constraint.influence == 0:
+        return []
+    several = [target.target for target in constraint.targets] if constraint.type == "ARMATURE" else []
+    return [target for target in (*several, getattr(constraint, "target", None)) if target]
+
+
 def is_posed(armature: bpy.types.Object) -> bool:
-    """Whether any bone is away from its rest pose."""
-    if armature.data.pose_position == "REST":
+    """Whether any bone is away from its rest pose by more than importers' rounding, 1e-5 of the armature's size.
+
+    Where constraints, drivers and animation have put the bones counts, not what their channels hold. If the armature
+    has deform bones, they alone count.
+    """
+    data = armature.data
+    if data.pose_position == "REST" or not data.bones:
         return False
-    return any(not bone.matrix_basis.is_identity for bone in armature.pose.bones)
+    names = sorted(deform_bones(armature)) or data.bones.keys()
+    pose, rest = _matrices(armature.pose.bones, "matrix", names), _matrices(data.bones, "matrix_local", names)
+    length = np.array([data.bones[name].length for name in names])
+    heads = rest[:, :3, 3]
+    size = float(np.linalg.norm(np.ptp(heads, axis=0))) + float(length.max())
+    # The ends of each bone's axes, as long as the bone is.
+    moved = (
+        np.abs(pose - rest)[:, :3, :] * np.concatenate([np.tile(length, (3, 1)), np.ones((1, len(names)))]).T[:, None]
+    )
+    return bool(moved.max() > 1e-5 * size)
 
 
-def attach(obj: bpy.types.Object, armature: bpy.types.Object) -> None:
-    """Add an Armature modifier: after mirroring, which needs the rest shape, and before all that builds on the pose."""
-    modifier = obj.modifiers.new(armature.name, "ARMATURE")
-    modifier.object = armature
+def attach(obj: bpy.types.Object, source: bpy.types.Object) -> None:
+    """Let the armatures that deform `source` deform `obj` in the same way: by modifiers of the same settings.
+
+    They come after mirroring, which needs the rest shape, and before all that builds on the pose.
+    """
     mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
-    obj.modifiers.move(len(obj.modifiers) - 1, mirrors[-1] + 1 if mirrors else 0)
+    place = mirrors[-1] + 1 if mirrors else 0
+    models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
+    for rig in [m.object for m in models] or [find(source)]:
+        modifier = obj.modifiers.new(rig.name, "ARMATURE")
+        modifier.object = rig
+        obj.modifiers.move(len(obj.modifiers) - 1, place)
+        place += 1
+    added = [m for m in obj.modifiers if m.type == "ARMATURE"]
+    for modifier, model in zip(added, models, strict=False):
+        for name in BINDING:
+            setattr(modifier, name, getattr(model, name))
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:
@@ -63,6 +138,17 @@ def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Seq
     pose = _matrices(armature.pose.bones, "matrix", bones)
     rest = _matrices(armature.data.bones, "matrix_local", bones)
     return np.array(object_from_armature) @ pose @ np.linalg.inv(rest) @ np.array(armature_from_object)
+
+
+def world_pose(rigs: Sequence[bpy.types.Object], bones: Sequence[str]) -> NDArray[np.float64]:
+    """(B, 4, 4) where each bone takes a point of the world that it carries, as the armatures are posed now."""
+    found = np.tile(np.eye(4), (len(bones), 1, 1))
+    for rig in reversed(rigs):
+        known = [column for column, name in enumerate(bones) if name in rig.data.bones]
+        names, world = [bones[column] for column in known], np.array(rig.matrix_world)
+        pose, rest = _matrices(rig.pose.bones, "matrix", names), _matrices(rig.data.bones, "matrix_local", names)
+        found[known] = world @ pose @ np.linalg.inv(rest) @ np.linalg.inv(world)
+    return found
 
 
 def _matrices(all_bones: bpy.types.bpy_prop_collection, name: str, bones: Sequence[str]) -> NDArray[np.float64]:

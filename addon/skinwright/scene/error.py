@@ -1,5 +1,7 @@
-"""What the scene cannot give or take, as a sentence for the artist."""
+"""The error that this layer raises."""
+
+from ..errors import Refused
 
 
-class SceneError(ValueError):
-    """One sentence that names the object, the problem and the cure; raised before anything is written."""
+class SceneError(Refused):
+    """What Blender's data cannot give or take: one sentence that names the object, the problem and the cure."""

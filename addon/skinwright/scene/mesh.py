@@ -1,4 +1,4 @@
-"""Meshes as arrays in world space, at rest or as the modifiers that only deform leave them."""
+"""Meshes as arrays in world space, at rest; shapes.py has what modifiers and shape keys make of them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,40 +7,10 @@ from functools import cached_property
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from .error import SceneError
-
-# These keep every vertex and its index. All others (Geometry Nodes too) may change the topology.
-_KEEPS_TOPOLOGY = {
-    "ARMATURE",
-    "CAST",
-    "CLOTH",
-    "CORRECTIVE_SMOOTH",
-    "CURVE",
-    "DATA_TRANSFER",
-    "DISPLACE",
-    "HOOK",
-    "LAPLACIANDEFORM",
-    "LAPLACIANSMOOTH",
-    "LATTICE",
-    "MESH_CACHE",
-    "MESH_DEFORM",
-    "NORMAL_EDIT",
-    "SHRINKWRAP",
-    "SIMPLE_DEFORM",
-    "SMOOTH",
-    "SOFT_BODY",
-    "SURFACE_DEFORM",
-    "UV_PROJECT",
-    "UV_WARP",
-    "VERTEX_WEIGHT_EDIT",
-    "VERTEX_WEIGHT_MIX",
-    "VERTEX_WEIGHT_PROXIMITY",
-    "WARP",
-    "WAVE",
-    "WEIGHTED_NORMAL",
-}
 
 
 @dataclass(frozen=True)
@@ -63,24 +33,26 @@ class Geometry:
         return high - low
 
 
-def read(obj: bpy.types.Object, *, evaluated: bool = False) -> Geometry:
-    """The object's original vertices in world space: at rest (Basis, no modifiers), or as posed and deformed now.
+def read(obj: bpy.types.Object) -> Geometry:
+    """The object's own vertices in world space at rest: the Basis, without modifiers.
 
     Raises SceneError for an empty mesh, a coordinate that is not finite and a world matrix that flattens the object.
     """
-    matrix = np.array(obj.matrix_world, dtype=np.float64)
-    determinant = _checked_determinant(obj, matrix)
-    local = _evaluated_positions(obj) if evaluated else rest_positions(obj.data)
-    triangle = triangles(obj)
-    if determinant < 0:
+    return placed(obj, obj.matrix_world, rest_positions(obj.data), triangles(obj))
+
+
+def placed(obj: bpy.types.Object, matrix: Matrix, local: NDArray[np.float32], triangle: NDArray[np.uint32]) -> Geometry:
+    """Local positions (V, 3) and triangles (T, 3) of `obj` in the world that its `matrix` leads to."""
+    world = np.array(matrix, dtype=np.float64)
+    if _checked_determinant(obj, world) < 0:
         triangle = triangle[:, ::-1]
     with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
-        positions = _transformed(local, matrix)
+        positions = transformed(local, world)
     _check_finite(obj, positions)
     return Geometry(positions, np.ascontiguousarray(triangle))
 
 
-def _transformed(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
+def transformed(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
     """Positions (V, 3) moved by an affine matrix (4, 4).
 
     Axis by axis: a product of long matrices would wake NumPy's BLAS, whose threads then hold a core for 0.1 s.
@@ -140,6 +112,12 @@ def other_users(obj: bpy.types.Object) -> list[str]:
     return [other.name for other in bpy.data.objects if other.data == obj.data and other != obj]
 
 
+def in_collections_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The visible meshes of the collections that hold the object, and of the collections in those."""
+    found = [other for collection in obj.users_collection for other in collection.all_objects]
+    return [other for other in dict.fromkeys(found) if other.type == "MESH" and other.visible_get()]
+
+
 @contextmanager
 def object_mode(context: bpy.types.Context) -> Iterator[None]:
     """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it."""
@@ -197,30 +175,6 @@ def vectors(collection: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.
     return values.reshape(-1, 3)
 
 
-def _evaluated_positions(obj: bpy.types.Object) -> NDArray[np.float32]:
-    with _topology_kept(obj):
-        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        now = positions(evaluated.data)
-    if not evaluated.is_evaluated:
-        raise SceneError(f"{obj.name} is disabled or excluded, so it has no current shape: show it or use rest shapes")
-    if len(now) != len(obj.data.vertices):
-        raise SceneError(f"{obj.name} has another number of vertices when evaluated: use rest shapes")
-    return now
-
-
-@contextmanager
-def _topology_kept(obj: bpy.types.Object) -> Iterator[None]:
-    """Switch off, for the moment, the modifiers after which a vertex is no longer the vertex that carries weights."""
-    hidden = [m for m in obj.modifiers if m.show_viewport and m.type not in _KEEPS_TOPOLOGY]
-    try:
-        for modifier in hidden:
-            modifier.show_viewport = False
-        yield
-    finally:
-        for modifier in hidden:
-            modifier.show_viewport = True
-
-
 def _check_finite(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:
     finite = np.isfinite(positions)
     if not finite.all():
@@ -230,7 +184,11 @@ def _check_finite(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None
 
 def triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
     """(T, 3) of its faces as they are, before modifiers. Raises SceneError where there are none."""
-    mesh = obj.data
+    return triangles_of(obj, obj.data)
+
+
+def triangles_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> NDArray[np.uint32]:
+    """(T, 3) of a mesh of the object: its own, or one that its modifiers leave."""
     if not mesh.polygons:
         raise SceneError(f"{obj.name} has no faces: weights are carried over surfaces, so give it some")
     corners = mesh.attributes.get(".corner_vert")  # not there in Edit mode

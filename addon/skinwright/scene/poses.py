@@ -1,49 +1,64 @@
 """Test poses: an armature is put into each in turn, and afterwards is as it was."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from . import armature as scene_armature
 from .error import SceneError
 
 _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
-# About the bone's own axes: bent both ways, bent sideways both ways, twisted.
-_BENDS = (("X", 1), ("X", -1), ("Z", 1), ("Z", -1), ("Y", 1))
-
-
-def range_of_motion(armature: bpy.types.Object, bones: Iterable[str], angle: float) -> Iterator[str]:
-    """Bend the bones by `angle` (radians), those equally deep in the hierarchy together; yields each pose's name."""
-    levels: dict[int, list[str]] = {}
-    for name in bones:
-        levels.setdefault(len(armature.data.bones[name].parent_recursive), []).append(name)
-    with _restored(armature):
-        for level in sorted(levels):
-            for axis, sign in _BENDS:
-                for bone in armature.pose.bones:
-                    bone.matrix_basis = Matrix.Identity(4)
-                for name in levels[level]:
-                    armature.pose.bones[name].matrix_basis = Matrix.Rotation(sign * angle, 4, axis)
-                bpy.context.view_layer.update()
-                yield f"level {level + 1} of the bones, {sign * math.degrees(angle):+.0f}° about {axis}"
 
 
 def keyframes(armature: bpy.types.Object, most: int) -> Iterator[str]:
     """The frames that have keys, at most so many, evenly chosen; yields "frame N"."""
-    scene = bpy.context.scene
     frames = sorted({round(key.co[0]) for curve in _curves(armature) for key in curve.keyframe_points})
     if not frames:
         raise SceneError(f"{armature.name} has no keyframes: give it an action, or choose Range of Motion")
+    for frame in _shown(armature, frames, most):
+        yield f"frame {frame}"
+
+
+def marked_frames(armature: bpy.types.Object, most: int) -> Iterator[str]:
+    """The frames with a marker in the timeline, at most so many, evenly chosen; yields their names."""
+    names: dict[int, str] = {}
+    for marker in bpy.context.scene.timeline_markers:
+        names.setdefault(marker.frame, marker.name)
+    if not names:
+        raise SceneError("The timeline has no markers: press M on the frames to test, or choose other poses")
+    for frame in _shown(armature, sorted(names), most):
+        yield f"{names[frame]} (frame {frame})"
+
+
+def library(armature: bpy.types.Object, most: int) -> Iterator[str]:
+    """The pose assets of this file, at most so many, evenly chosen; yields their names."""
+    actions = [action for action in bpy.data.actions if action.asset_data]
+    if not actions:
+        raise SceneError("There are no pose assets in this file: create some, or choose other poses")
+    rest = [Matrix.Identity(4)] * len(armature.pose.bones)
+    with _restored(armature):
+        for action in actions[:: math.ceil(len(actions) / most)]:
+            for bone, matrix in zip(armature.pose.bones, rest, strict=True):
+                bone.matrix_basis = matrix
+            armature.pose.apply_pose_from_action(action)
+            bpy.context.view_layer.update()
+            yield action.name
+
+
+def _shown(armature: bpy.types.Object, frames: Sequence[int], most: int) -> Iterator[int]:
+    """Show these frames, at most so many, evenly chosen."""
+    scene = bpy.context.scene
     before = scene.frame_current, scene.frame_subframe
     with _restored(armature):
         try:
             for frame in frames[:: math.ceil(len(frames) / most)]:
                 scene.frame_set(frame)
-                yield f"frame {frame}"
+                yield frame
         finally:
             scene.frame_set(before[0], subframe=before[1])
 
@@ -68,6 +83,47 @@ def frames(numbers: Sequence[int]) -> Iterator[int]:
             yield number
     finally:
         scene.frame_set(before[0], subframe=before[1])
+
+
+def take(obj: bpy.types.Object, bones: Sequence[str], pose_from_rest: NDArray[np.floating]) -> None:
+    """Pose the armatures of `obj` so that each bone (B,) moves the world as its matrix (B, 4, 4) says.
+
+    Raises SceneError, with the pose as before, where constraints or drivers keep bones from obeying.
+    """
+    rigs = scene_armature.rigs(obj)
+    wanted = dict(zip(bones, pose_from_rest, strict=True))
+    with ExitStack() as undo:
+        for rig in rigs:
+            undo.enter_context(_restored(rig))
+        for rig in rigs:
+            _set_matrices(rig, wanted)
+        now = scene_armature.world_pose(rigs, list(bones))
+        size = max(rig.dimensions.length for rig in rigs)
+        astray = [b for b, pose in zip(bones, now, strict=True) if np.abs(pose - wanted[b]).max() > 1e-3 * max(size, 1)]
+        if astray:
+            raise SceneError(
+                f"{len(astray)} bones of {rigs[0].name}, {astray[0]} for one, follow constraints or drivers and cannot "
+                "be put into this pose: the overlay Faults shows the offenders all the same"
+            )
+        undo.pop_all()  # done: let the pose stay
+
+
+def _set_matrices(rig: bpy.types.Object, wanted: dict[str, NDArray[np.floating]]) -> None:
+    """Set the pose of the bones that are wanted, level by level, as a bone's matrix builds on that of its parent."""
+    for bone in rig.pose.bones:
+        bone.matrix_basis = Matrix.Identity(4)
+    rig.data.pose_position = "POSE"
+    world = np.array(rig.matrix_world)
+    levels: dict[int, list[bpy.types.PoseBone]] = {}
+    for bone in rig.pose.bones:
+        if bone.name in wanted:
+            levels.setdefault(len(bone.bone.parent_recursive), []).append(bone)
+    bpy.context.view_layer.update()
+    for level in sorted(levels):
+        for bone in levels[level]:
+            rest = np.array(bone.bone.matrix_local)
+            bone.matrix = Matrix((np.linalg.inv(world) @ wanted[bone.name] @ world @ rest).tolist())
+        bpy.context.view_layer.update()
 
 
 @contextmanager

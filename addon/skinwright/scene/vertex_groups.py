@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import csr
+from .. import csr, soundness
 from ..csr import Rows
 from . import deform_array
 from .error import SceneError
@@ -30,30 +30,6 @@ class Memberships:
     array: deform_array.DeformArray | None = None
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """All groups of an object: `rows` over `names`, and the active one."""
-
-    names: list[str]
-    rows: Rows
-    active: str
-
-
-def snapshot(obj: bpy.types.Object) -> Snapshot:
-    """What `restore` needs to bring everything back; not in Edit mode."""
-    names = [group.name for group in obj.vertex_groups]
-    return Snapshot(names, read(obj, names), obj.vertex_groups.active.name if obj.vertex_groups.active else "")
-
-
-def restore(obj: bpy.types.Object, before: Snapshot) -> None:
-    """Bring back every membership bit for bit; groups made since then go."""
-    for group in list(obj.vertex_groups):
-        if group.name not in before.names:
-            obj.vertex_groups.remove(group)
-    write(obj, before.names, before.rows)
-    activate(obj, before.active)
-
-
 def activate(obj: bpy.types.Object, name: str) -> None:
     """Make the group of this name the active one, if there is one."""
     if name in obj.vertex_groups:
@@ -71,11 +47,20 @@ def read(obj: bpy.types.Object, names: Sequence[str]) -> Rows:
     `bones` index into `names` and ascend in each row; a name the object lacks has no entries.
     Raises SceneError for a weight that is not a number.
     """
-    n = len(obj.data.vertices)
-    indices = [obj.vertex_groups.find(_stored(name)) for name in names]
-    if all(index < 0 for index in indices):
+    return _read(obj, obj.data, {group.name: group.index for group in obj.vertex_groups}, names)
+
+
+def read_evaluated(obj: bpy.types.Object, mesh: bpy.types.Mesh, names: Sequence[str]) -> Rows:
+    """The same of a mesh that the modifiers of an evaluated object leave."""
+    return _read(obj, mesh, {group.name: group.index for group in obj.vertex_groups}, names)
+
+
+def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], names: Sequence[str]) -> Rows:
+    n = len(mesh.vertices)
+    indices = [index.get(_stored(name), -1) for name in names]
+    if all(i < 0 for i in indices):
         return csr.empty(n)
-    held = _memberships(obj.data, np.arange(n, dtype=np.int64))
+    held = _memberships(mesh, np.arange(n, dtype=np.int64))
     column = _lookup(indices, held.group)
     keep = column >= 0
     vertex, column, values = held.row[keep], column[keep], held.values[keep]
@@ -91,6 +76,7 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     `vertices` are distinct; None stands for all. Groups the object lacks are created; memberships in `names` that a
     row does not hold are removed; other groups, other vertices and the locks stay. Values are stored bit for bit.
     """
+    soundness.check(obj.name, rows)
     owned = np.array([group.index for group in ensure(obj, names)], np.int64)
     mesh = obj.data
     indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
@@ -118,11 +104,11 @@ def _change_members(
     if np.array_equal(held_order, order):
         return False
     missing, stale = ~_find(held_order, keys)[1], ~_find(order, held_keys)[1]
-    # One call a group; what else there is to write is values.
+    # One call per group. New members begin at 0, so that no row holds too much, whatever stops the work in between.
     for index, members in _by_group(indices[held_row[stale]], held_group[stale]):
         obj.vertex_groups[index].remove(members)
     for index, members in _by_group(indices[row[missing]], group[missing]):
-        obj.vertex_groups[index].add(members, 1.0, "REPLACE")
+        obj.vertex_groups[index].add(members, 0.0, "REPLACE")
     return True
 
 

@@ -6,9 +6,7 @@ where it was not touched; and the poses, either `frames` (S,) of the scene, or `
 """
 
 from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
-from typing import Any, get_args, get_origin
 
 import bpy
 import numpy as np
@@ -17,7 +15,10 @@ from numpy.typing import NDArray
 from ..reporting import SculptReport
 from ..scene import poses
 from ..scene.error import SceneError
-from .session import SculptOptions, SculptSession
+from .params import SculptParams, options_from_json
+from .session import SculptSession
+
+__all__ = ["options_from_json", "read", "replay"]
 
 Sculpts = dict[str, NDArray]
 
@@ -47,7 +48,7 @@ def _problem(sculpts: Sculpts) -> str:
     return "" if sculpts["matrices"].shape == expected else f"`matrices` must have shape {expected}"
 
 
-def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptOptions) -> SculptReport:
+def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> SculptReport:
     """Sculpt `obj` to all of them; afterwards pose and frame are as before.
 
     Raises SceneError or native.NativeError with the object as it was.
@@ -61,7 +62,7 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptOptions) -> S
             positions = sculpts["positions"][number]
             touched = np.flatnonzero(np.isfinite(positions).all(axis=1))
             session.sculpt(touched, positions[touched].astype(np.float32))
-    except ValueError:
+    except BaseException:
         session.cancel()
         raise
     return session.commit()
@@ -75,19 +76,3 @@ def _poses(rig: bpy.types.Object, sculpts: Sculpts) -> Iterator[int]:
     if missing:
         raise SceneError(f"{rig.name} has no bone {missing[0]}, which was posed: use the same armature")
     return poses.recorded(rig, names, sculpts["matrices"])
-
-
-def options_from_json(settings: Any) -> SculptOptions:
-    """Options from a JSON object of their names. Raises ValueError for another name or type."""
-    if not isinstance(settings, dict):
-        raise ValueError(f"settings must be a JSON object, not {settings!r}")
-    known = {field.name: field.type for field in fields(SculptOptions)}
-    for name, value in settings.items():
-        if name not in known:
-            raise ValueError(f"there is no setting {name}; there are {', '.join(sorted(known))}")
-        kind: Any = known[name]
-        accepted: Any = {float: (int, float), int: int}.get(kind, str)
-        choices = get_args(kind) if get_origin(kind) else ()
-        if isinstance(value, bool) or not isinstance(value, accepted) or (choices and value not in choices):
-            raise ValueError(f"setting {name} cannot be {value!r}")
-    return SculptOptions(**settings)

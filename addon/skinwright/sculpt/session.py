@@ -6,7 +6,6 @@ name each time, as Blender's undo replaces it.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import bpy
 import numpy as np
@@ -16,29 +15,12 @@ from numpy.typing import NDArray
 from .. import csr, native
 from ..desparsify import DesparsifyParams, desparsify
 from ..reporting import SculptReport
-from ..scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups
+from ..scene import armature, corrective, deform_array, mesh, poses, rest_shape, sculpting, vertex_groups, weight_state
 from ..scene.error import SceneError
+from .params import SculptParams as SculptOptions
 
 # Every keyframe costs a pass over the mesh when a session begins.
 MOST_GUARD_FRAMES = 24
-
-
-@dataclass(frozen=True)
-class SculptOptions:
-    """How strokes become weights; `kappa` and `passes` as in the native stub.
-
-    `candidates` are given to every vertex at the start (0: only those it has). `guard` poses hold with `guard_alpha`;
-    rest always holds. `residual` is what becomes of what weights cannot reach.
-    """
-
-    kappa: float = 0.01
-    passes: int = 3
-    candidates: int = 4
-    method: Literal["surface", "hop"] = "surface"
-    guard: Literal["NONE", "ACTION", "RANGE"] = "NONE"
-    guard_alpha: float = 0.2
-    residual: Literal["DISCARD", "SHAPE_KEY"] = "DISCARD"
-    threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -61,7 +43,7 @@ class SculptSession:
         self.options = options or SculptOptions()
         rig = sculpting.check(obj)
         self.target_name, self.rig_name = obj.name, rig.name
-        self._weights_before = vertex_groups.snapshot(obj)
+        self._weights_before = weight_state.capture(obj)
         self._shape = rest_shape.read(obj)
         self._rotations: dict[int, dict[str, Quaternion]] = {}
         self._guarded: set[int] = set()
@@ -71,7 +53,7 @@ class SculptSession:
                 params = DesparsifyParams(self.options.candidates, self.options.method, threads=self.options.threads)
                 desparsify(obj, params)
             self._prepare(obj, rig)
-        except (SceneError, native.NativeError):
+        except BaseException:
             self._restore(obj)
             raise
 
@@ -223,7 +205,7 @@ class SculptSession:
             self._restore(obj)
 
     def _restore(self, obj: bpy.types.Object) -> None:
-        vertex_groups.restore(obj, self._weights_before)
+        weight_state.apply(obj, self._weights_before)
         rest_shape.restore(obj, self._shape)
         obj.data.update()
 

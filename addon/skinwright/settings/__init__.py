@@ -7,9 +7,9 @@ from bpy.types import Object, PropertyGroup, Scene
 from .overlay import SKINWRIGHT_PG_overlay
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
-from .transfer import SKINWRIGHT_PG_transfer, TransferOptions
+from .transfer import SKINWRIGHT_PG_transfer, TransferSettings
 
-__all__ = ["CLASSES", "TransferOptions", "register", "unregister"]
+__all__ = ["CLASSES", "TransferSettings", "register", "unregister"]
 
 
 class SKINWRIGHT_PG_scene(PropertyGroup):

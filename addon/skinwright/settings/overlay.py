@@ -14,7 +14,9 @@ class SKINWRIGHT_PG_overlay(PropertyGroup):
             ("NONE", "None", "Draw nothing"),
             ("MATCH", "Match", "Which vertices match, which are inpainted, which the mask decides"),
             ("INFLUENCES", "Influences", "How many bones each vertex of the active mesh follows"),
+            ("DIFFERENCE", "Difference", "How far the weights are from the state that Compare Weights has shown"),
             ("STRETCH", "Stretch", "Where the pose stretches or presses the edges of the active mesh"),
+            ("FAULTS", "Faults", "What Check Weights last found on the active mesh"),
         ],
     )
     opacity: FloatProperty(

@@ -1,75 +1,35 @@
 """The settings of desparsification and of sculpting as Blender properties."""
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from typing import TYPE_CHECKING, Any
+
+from bpy.props import BoolProperty, EnumProperty
 from bpy.types import PropertyGroup, UILayout
 
-from ..desparsify import DesparsifyParams
-from ..sculpt.session import SculptOptions
+from ..desparsify.params import DesparsifyParams
+from ..sculpt.params import SculptParams
+from .properties import properties, values
+
+CANDIDATES = properties(DesparsifyParams, ["n", "method"])
 
 
-class CandidateOptions:
-    """How many bones a vertex has to choose from, and which; a mix-in for the operator and the panel."""
-
-    n: IntProperty(
-        name="Bones",
-        description="Members every vertex has afterwards; the smallest beyond that are dropped",
-        default=4,
-        min=1,
-        soft_max=8,
-        max=12,
-    )
-    method: EnumProperty(
-        name="Method",
-        description="Which bones a vertex gets",
-        items=[
-            ("SURFACE", "Surface", "The bones whose regions are nearest along the surface"),
-            ("HOP", "Hierarchy", "The bones that are fewest steps away in the armature"),
-        ],
-    )
-
-
-class SKINWRIGHT_PG_sculpt(CandidateOptions, PropertyGroup):
+class SKINWRIGHT_PG_sculpt(PropertyGroup):
     """The panel's settings, kept in the scene."""
 
-    add_candidates: BoolProperty(
-        name="Desparsify First",
-        description="Give every vertex its bones to choose from when sculpting begins",
-        default=True,
+    __annotations__ = (
+        CANDIDATES
+        | {
+            "add_candidates": BoolProperty(
+                name="Desparsify First",
+                description="Give every vertex its bones to choose from when sculpting begins",
+                default=True,
+            )
+        }
+        | properties(SculptParams, ["kappa", "guard", "guard_alpha", "residual"])
     )
-    kappa: FloatProperty(
-        name="Stiffness",
-        description="How much weights hold on to what they were: low follows the sculpt, high hardly moves",
-        default=0.01,
-        min=0.001,
-        max=0.05,
-        precision=3,
-        step=0.1,
-    )
-    guard: EnumProperty(
-        name="Guard Poses",
-        description="Poses whose shape a stroke should not spoil; the rest pose is always safe",
-        items=[
-            ("NONE", "None", "Only the poses sculpted in so far"),
-            ("ACTION", "Keyframes", "The frames that have keys in the armature's action"),
-            ("RANGE", "Range of Motion", "Turns of the touched bones by 45 and 90 degrees"),
-        ],
-    )
-    guard_alpha: FloatProperty(
-        name="Guard Strength",
-        description="How much a guard pose counts against the sculpted one",
-        default=0.2,
-        min=0.01,
-        max=1,
-        subtype="FACTOR",
-    )
-    residual: EnumProperty(
-        name="Leftover",
-        description="What becomes of the part of a sculpt that no weights can reach",
-        items=[
-            ("DISCARD", "Discard", "It is lost"),
-            ("SHAPE_KEY", "Shape Key", "It goes to a corrective shape key that the joint's turn drives"),
-        ],
-    )
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The properties, which mypy cannot see."""
 
     def draw_settings(self, layout: UILayout) -> None:
         """What is asked when sculpting begins; the stiffness may change with every stroke."""
@@ -83,31 +43,31 @@ class SKINWRIGHT_PG_sculpt(CandidateOptions, PropertyGroup):
             layout.prop(self, "guard_alpha", slider=True)
         layout.prop(self, "residual")
 
-    def to_options(self, threads: int = 0) -> SculptOptions:
-        """As plain values."""
-        return SculptOptions(
-            kappa=self.kappa,
-            candidates=self.n if self.add_candidates else 0,
-            method=self.method.lower(),
-            guard=self.guard,
-            guard_alpha=self.guard_alpha,
-            residual=self.residual,
-            threads=threads,
+    def to_options(self, threads: int = 0) -> SculptParams:
+        """As plain values. Raises SettingError for a value outside its range."""
+        candidates = self.n if self.add_candidates else 0
+        return SculptParams(**values(self, SculptParams), candidates=candidates, threads=threads)
+
+
+class DesparsifySettings:
+    """What the desparsify operator asks; a mix-in."""
+
+    __annotations__ = CANDIDATES | {
+        "subset": EnumProperty(
+            name="Vertices",
+            description="Which vertices are given bones",
+            items=[
+                ("ALL", "All", "Every vertex of the mesh"),
+                ("SELECTED", "Selected", "Those selected in Edit mode or by the paint mask"),
+            ],
         )
+    }
+    if TYPE_CHECKING:
 
-
-class DesparsifyOptions(CandidateOptions):
-    """What the desparsify operator asks beside that."""
-
-    subset: EnumProperty(
-        name="Vertices",
-        description="Which vertices are given bones",
-        items=[
-            ("ALL", "All", "Every vertex of the mesh"),
-            ("SELECTED", "Selected", "Those selected in Edit mode or by the paint mask"),
-        ],
-    )
+        def __getattr__(self, name: str) -> Any:
+            """The properties, which mypy cannot see."""
 
     def to_params(self, threads: int = 0) -> DesparsifyParams:
-        """As plain values."""
-        return DesparsifyParams(self.n, self.method.lower(), self.subset == "SELECTED", threads)
+        """As plain values. Raises SettingError for a value outside its range."""
+        chosen = values(self, DesparsifyParams) | {"selected_only": self.subset == "SELECTED"}
+        return DesparsifyParams(**chosen, threads=threads)

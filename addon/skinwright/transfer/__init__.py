@@ -1,37 +1,100 @@
 """Weights from a body to garments, without an operator or a window: read, compute, write."""
 
-import bpy
+from collections.abc import Callable, Sequence
 
-from .. import jobs
+import bpy
+import numpy as np
+
+from .. import csr, jobs, soundness
 from ..reporting import Report
-from ..scene import mesh
-from .checks import check_objects, source_warnings
-from .compute import compute
-from .inputs import read_body, read_garment
+from ..scene import mesh, weight_state
+from ..scene.error import SceneError
+from .checks import check_source, source_warnings, target_problem
+from .compute import Failure, compute
+from .inputs import Body, Garment, read_body, read_garment
 from .params import Mask, TransferParams, from_json, to_json
-from .write import write
+from .write import Plan, plan, write
 
 __all__ = ["Mask", "TransferParams", "from_json", "steps", "to_json", "transfer_weights"]
 
 
-def transfer_weights(
-    context: bpy.types.Context, source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
-) -> Report:
-    """Transfer from `source` to each of `targets`; all of them are computed before the first is written.
+BeforeWrite = Callable[[Sequence[bpy.types.Object]], None]
 
-    Raises SceneError or native.NativeError with a sentence; then nothing has been written.
+
+def transfer_weights(
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    targets: list[bpy.types.Object],
+    params: TransferParams,
+    before_write: BeforeWrite | None = None,
+) -> Report:
+    """Transfer from `source` to each of `targets`: all are computed before the first is written, and all or none are.
+
+    `before_write` is told when writing begins. Raises SceneError or native.NativeError with a sentence.
     """
-    return jobs.wait(steps(context, source, targets, params))
+    return jobs.wait(steps(context, source, targets, params, before_write))
 
 
 def steps(
-    context: bpy.types.Context, source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    targets: list[bpy.types.Object],
+    params: TransferParams,
+    before_write: BeforeWrite | None = None,
 ) -> jobs.Jobs[Report]:
     """The same as a generator of jobs, for a window that must live on meanwhile."""
-    check_objects(source, targets, params)
+    check_source(source, targets)
     with mesh.object_mode(context):
-        body = read_body(source, params)
-        garments = [read_garment(target, body, params) for target in targets]
-        results = yield from compute(body, garments, params)
-        reports = [write(body, garment, result, params) for garment, result in zip(garments, results, strict=True)]
-    return Report(source.name, reports, source_warnings(body, reports[0].native))
+        body = read_body(source, params, targets)
+        garments, failures = _read(source, targets, body, params)
+        results, unsolved = yield from compute(body, garments, params)
+        plans, unbindable = _plan(body, [garment for garment in garments if garment.object.name in results], results)
+        failures += unsolved + unbindable
+        if failures and not (params.skip_failing and plans):
+            raise SceneError("; ".join(failure.sentence for failure in failures))
+        for planned in plans:
+            last_look(body, planned)
+        written = [planned.garment.object for planned in plans]
+        if before_write:
+            before_write(written)
+        with weight_state.all_or_nothing(written):
+            reports = [write(body, planned, params) for planned in plans]
+    warnings = source_warnings(body, reports[0].native)
+    return Report(body.name, reports, warnings, [failure.sentence for failure in failures])
+
+
+def _read(
+    source: bpy.types.Object, targets: list[bpy.types.Object], body: Body, params: TransferParams
+) -> tuple[list[Garment], list[Failure]]:
+    garments: list[Garment] = []
+    failures: list[Failure] = []
+    for target in targets:
+        problem = target_problem(source, target, targets, params)
+        try:
+            if problem:
+                raise SceneError(problem)
+            garments.append(read_garment(target, body, params))
+        except SceneError as error:
+            failures.append(Failure(target.name, str(error)))
+    return garments, failures
+
+
+def _plan(body: Body, garments: list[Garment], results: dict) -> tuple[list[Plan], list[Failure]]:
+    plans: list[Plan] = []
+    failures: list[Failure] = []
+    for garment in garments:
+        try:
+            plans.append(plan(body, garment, results[garment.object.name]))
+        except SceneError as error:
+            failures.append(Failure(garment.object.name, str(error)))
+    return plans, failures
+
+
+def last_look(body: Body, planned: Plan) -> None:
+    """Raise Unsound for rows that are no weights, before the first garment is written."""
+    garment, result = planned.garment, planned.result
+    name, bones = garment.object.name, np.array([name not in body.fields for name in result.names], bool)
+    soundness.check(name, result.rows)
+    complete = not garment.held.any() and not body.is_partial
+    rows = csr.take_rows(result.rows, np.flatnonzero(result.written))
+    soundness.check_sums(name, rows, bones, least=1.0 if complete else 0.0)

@@ -5,59 +5,56 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import armature, mesh, vertex_groups
+from ..scene import armature, mesh, mirror, sides, vertex_groups
 from ..scene.error import SceneError
 from .inputs import Body, Garment
 from .params import TransferParams
 
 
 def check_objects(source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams) -> None:
-    """Raise SceneError for objects that cannot give or take weights."""
+    """Raise SceneError for objects that cannot give or take weights; every one of them is named."""
+    check_source(source, targets)
+    problems = [target_problem(source, target, targets, params) for target in targets]
+    if any(problems):
+        raise SceneError("; ".join(problem for problem in problems if problem))
+
+
+def check_source(source: bpy.types.Object, targets: list[bpy.types.Object]) -> None:
+    """Raise SceneError where there is nothing to take weights from, or nothing to give them to."""
     if source.type != "MESH":
         raise SceneError(f"{source.name} is not a mesh: pick the mesh of the body as source")
     if not targets:
         raise SceneError("There is nothing to transfer to: select one or more meshes")
-    for target in targets:
-        _check_target(source, target)
-    if not params.make_single_user:
-        _check_shared([source, *targets])
 
 
-def _check_target(source: bpy.types.Object, target: bpy.types.Object) -> None:
+def target_problem(
+    source: bpy.types.Object, target: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
+) -> str:
+    """Why a target cannot take weights, or nothing."""
     if target == source:
-        raise SceneError(f"{target.name} is source and target at once: pick another source or deselect it")
+        return f"{target.name} is source and target at once: pick another source or deselect it"
     if target.type != "MESH":
-        raise SceneError(f"{target.name} is not a mesh: deselect it or convert it")
+        return f"{target.name} is not a mesh: deselect it or convert it"
     for data in (target, target.data):
         if not data.is_editable:
             origin = data.library.filepath if data.library else "another file"
-            raise SceneError(
-                f"{target.name} is linked from {origin}: make it local or a library override with its mesh"
-            )
-
-
-def _check_shared(objects: list[bpy.types.Object]) -> None:
-    first: dict[bpy.types.ID, bpy.types.Object] = {}
-    for obj in objects:
-        other = first.setdefault(obj.data, obj)
-        if other != obj:
-            raise SceneError(
-                f"{other.name} and {obj.name} share one mesh and so its weights: make it single-user first"
-            )
+            return f"{target.name} is linked from {origin}: make it local or a library override with its mesh"
+    if not params.make_single_user:
+        for other in (source, *targets):
+            if other.data == target.data and other != target:
+                return f"{other.name} and {target.name} share one mesh and so its weights: make it single-user first"
+    return ""
 
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
-    found = []
-    rigs = {modifier.object for modifier in armature.modifiers(body.object)}
-    if body.armature and len(rigs) > 1:
-        found.append(f"{body.object.name} has {len(rigs)} armatures; {body.armature.name} was taken")
+    found = [_source_mirror(body)] if _source_mirror(body) else []
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
-        found.append(f"{count} vertices of {body.object.name} have weights that do not sum to 1, and were normalised")
+        found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
     if body.bones and native_report["source_unweighted"]:
         count = native_report["source_unweighted"]
-        found.append(f"{count} vertices of {body.object.name} have no weights, so nothing matches there")
+        found.append(f"{count} vertices of {body.name} have no weights, so nothing matches there")
     return found
 
 
@@ -66,7 +63,8 @@ def garment_warnings(body: Body, garment: Garment, params: TransferParams) -> li
     found = (
         _alignment(body, garment),
         _shear(body, garment),
-        _mirror(garment),
+        _mirror(body, garment),
+        _unseen(garment),
         _pose(body, garment, params),
         _rig(body, garment),
         _other_bones(body, garment, params),
@@ -76,11 +74,11 @@ def garment_warnings(body: Body, garment: Garment, params: TransferParams) -> li
 
 
 def _alignment(body: Body, garment: Garment) -> str:
-    a, b = body.geometry, garment.geometry
+    a, b = body.geometry, garment.shape.geometry
     diagonal = float(np.linalg.norm(a.size))
     (a_low, a_high), (b_low, b_high) = a.bounds, b.bounds
     gap = np.maximum(a_low - b_high, b_low - a_high).max()
-    if gap > 0.05 * diagonal or not 0.02 * diagonal < np.linalg.norm(b.size) < 3 * diagonal:
+    if gap > 0.05 * diagonal or not 0.002 * diagonal < np.linalg.norm(b.size) < 3 * diagonal:
         return f"{garment.object.name} and {body.object.name} hardly overlap: are they aligned and of one scale?"
     return ""
 
@@ -92,30 +90,61 @@ def _shear(body: Body, garment: Garment) -> str:
     return f"The scale of a parent shears {' and '.join(sheared)}: apply it if the angles of the match look wrong"
 
 
-def _mirror(garment: Garment) -> str:
+def _mirror(body: Body, garment: Garment) -> str:
     """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
-    half = [m for m in garment.object.modifiers if m.type == "MIRROR" and not m.use_mirror_vertex_groups]
-    if not half:
+    found = mirror.before_the_pose(garment.object)
+    half = [m for m in found if not m.use_mirror_vertex_groups]
+    if half:
+        return (
+            f"Vertex Groups is off in the modifier {half[0].name} of {garment.object.name}: "
+            "both sides will follow the bones of one"
+        )
+    name = sides.unflippable(body.opposite)
+    if not found or not name:
         return ""
     return (
-        f"Vertex Groups is off in the modifier {half[0].name} of {garment.object.name}: "
-        "both sides will follow the bones of one"
+        f"The modifier {found[0].name} of {garment.object.name} cannot tell that {body.opposite[name]} mirrors {name}, "
+        "so both sides will follow the bones of one: apply it and transfer again, or rename the bones"
+    )
+
+
+def _source_mirror(body: Body) -> str:
+    """Blender's mirroring leaves weights of such names on the side they were painted for."""
+    name = sides.unflippable(body.opposite)
+    mirrored = [obj for obj in body.objects if mirror.before_the_pose(obj)]
+    if not mirrored or not name:
+        return ""
+    return (
+        f"The Mirror modifier of {mirrored[0].name} cannot tell that {body.opposite[name]} mirrors {name}: "
+        "both sides of the body follow the bones of one, and so will what is next to it"
+    )
+
+
+def _unseen(garment: Garment) -> str:
+    """Shapes that are visible, but of which no vertex of the mesh knows."""
+    unseen = garment.shape.unseen
+    if not unseen:
+        return ""
+    one = "the modifier" if len(unseen) == 1 else "the modifiers"
+    return (
+        f"What {one} {', '.join(unseen)} of {garment.object.name} makes was not taken into account: "
+        "apply it if the match should be with the shape it makes"
     )
 
 
 def _pose(body: Body, garment: Garment, params: TransferParams) -> str:
     follows = armature.find(garment.object)
-    if params.evaluated or follows or body.armature is None or not armature.is_posed(body.armature):
+    if params.geometry == "CURRENT" or follows or body.armature is None or not armature.is_posed(body.armature):
         return ""
     return (
-        f"{body.armature.name} is posed, and rest shapes were compared: "
-        f"set Geometry to Current if {garment.object.name} was modelled on the posed body"
+        f"{body.armature.name} is posed, and shapes in rest pose were compared: "
+        f"set Geometry to Current if {garment.object.name} was fitted on the posed body, to bind it in this pose"
     )
 
 
 def _rig(body: Body, garment: Garment) -> str:
     rig = armature.find(garment.object)
-    if rig is None or rig == body.armature:
+    if rig is None or rig in body.rigs:
         return ""
     missing = [name for name in body.bones if name in body.chosen and name not in rig.data.bones]
     if not missing:
@@ -124,17 +153,15 @@ def _rig(body: Body, garment: Garment) -> str:
 
 
 def _other_bones(body: Body, garment: Garment, params: TransferParams) -> str:
-    """Deforming weights that stay beside the new ones make them count for less."""
-    rig = armature.find(garment.object)
-    if rig is None or params.groups not in ("BONE_DEFORM", "ALL"):
+    """Weights of bones that the body lacks stay, as they move what is the garment's own."""
+    if params.groups not in ("BONE_DEFORM", "ALL"):
         return ""
-    others = armature.deform_bones(rig) - set(body.bones) - garment.locks
-    names = sorted(others & {group.name for group in garment.object.vertex_groups})
+    names = [name for name in garment.names if name not in body.bones and name not in garment.locks]
     if not names or not (vertex_groups.read(garment.object, names).values > 0).any():
         return ""
     return (
         f"{garment.object.name} keeps its weights in {len(names)} groups of bones {body.object.name} lacks "
-        f"({names[0]} for one): lock them to have the new weights fill what they leave, or remove them"
+        f"({names[0]} for one), and the new ones fill what they leave: remove those groups if they should not count"
     )
 
 

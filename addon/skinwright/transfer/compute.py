@@ -4,7 +4,9 @@ The functions are generators: each yields a job and is sent what it gave, so tha
 """
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,30 +15,68 @@ from numpy.typing import NDArray
 from .. import csr, native
 from ..csr import Rows
 from ..jobs import Jobs
-from . import merging, scalar_fields
+from ..scene.mesh import Geometry
+from . import merging, parts, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
 
 
 @dataclass(frozen=True)
 class Result:
-    """The new rows over `names`, for the vertices marked in `written`; `transfer` is the library's own answer."""
+    """The new rows over `names`, for the vertices marked in `written`.
 
-    transfer: Any
+    `matched` (V,) and `report` are the library's own answer; `report` covers all that was solved with this target.
+    """
+
+    matched: NDArray[np.bool_]
+    report: dict[str, Any]
     names: list[str]
     rows: Rows
     written: NDArray[np.bool_]
     seconds: float
 
 
-def compute(body: Body, garments: list[Garment], params: TransferParams) -> Jobs[list[Result]]:
-    """The new rows of every garment. Raises native.NativeError where there is no answer."""
-    packed = scalar_fields.pack(body.field_weights, len(body.fields)) if body.fields else None
-    source = bone_source(body) if body.bones else _source(body, packed, len(body.fields) + 1)
-    results = []
-    for garment in garments:
-        results.append((yield from _compute_one(body, garment, source, packed, params)))
-    return results
+@dataclass(frozen=True)
+class Answer:
+    """What the library says of the vertices of one target."""
+
+    matched: NDArray[np.bool_]
+    has_row: NDArray[np.bool_]
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A target without an answer, and the sentence why."""
+
+    name: str
+    sentence: str
+
+
+def compute(
+    body: Body, garments: list[Garment], params: TransferParams
+) -> Jobs[tuple[dict[str, Result], list[Failure]]]:
+    """The new rows by target's name, and the targets that have no answer."""
+    fields = scalar_fields.pack(body.field_weights, len(body.fields)) if body.fields else None
+    source = bone_source(body) if body.bones else _source(body, fields, len(body.fields) + 1)
+    results: dict[str, Result] = {}
+    failures: list[Failure] = []
+    for together in solved_together(garments, params):
+        try:
+            found = yield from _compute_group(body, together, source, fields, params)
+        except native.NativeError as error:
+            failures.append(Failure(" + ".join(garment.object.name for garment in together), str(error)))
+        else:
+            results |= {garment.object.name: result for garment, result in zip(together, found, strict=True)}
+    return results, failures
+
+
+def solved_together(garments: list[Garment], params: TransferParams) -> list[list[Garment]]:
+    """The targets in groups, each one system: those whose borders lie on each other."""
+    if not params.join_borders or len(garments) == 1:
+        return [[garment] for garment in garments]
+    found = parts.groups([garment.shape.geometry for garment in garments])
+    return [[garments[number] for number in group] for group in found]
 
 
 def bone_source(body: Body) -> native.Source:
@@ -44,65 +84,169 @@ def bone_source(body: Body) -> native.Source:
     return _source(body, body.bone_weights, len(body.bones))
 
 
-def prepare(source: native.Source, garment: Garment, params: TransferParams) -> native.Inpainting:
-    """The garment laid over the body; the mask and the thresholds may still change."""
-    geometry = garment.geometry
-    return native.Inpainting(
-        source, garment.object.name, geometry.positions, geometry.triangles, params.method, params.threads
-    )
+class Prepared:
+    """Targets laid over a body as one mesh; the mask and the thresholds may still change.
+
+    Arrays are those of the targets' own vertices, one target after the other: no mirrored halves.
+    """
+
+    def __init__(self, source: native.Source, garments: Sequence[Garment], params: TransferParams) -> None:
+        self.garments = garments
+        self.name = " + ".join(garment.object.name for garment in garments)
+        geometry = parts.united([garment.geometry for garment in garments])
+        arrays = (geometry.positions, geometry.triangles)
+        self._inpainting = native.Inpainting(source, self.name, *arrays, params.threads, method=params.method)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float32]:
+        """(V,) world units."""
+        return self._own(self._inpainting.distance)
+
+    @cached_property
+    def angle(self) -> NDArray[np.float32]:
+        """(V,) radians."""
+        return self._own(self._inpainting.angle)
+
+    @cached_property
+    def islands(self) -> NDArray[np.uint32]:
+        """(V,) the loose part of each vertex."""
+        return self._own(self._inpainting.islands)
+
+    def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
+        """(V,) which vertices match; waits for a job that is going on. `mask` (V,) may be among the keywords."""
+        mask = thresholds.pop("mask", None)
+        return self._own(self._inpainting.matched(mask=self._spread([mask]), **thresholds))
+
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; otherwise as `matched`."""
+        mask = thresholds.pop("mask", None)
+        return self._own(self._inpainting.confidence(mask=self._spread([mask]), **thresholds))
+
+    def start(self, masks: Sequence[NDArray[np.uint8] | None], **params: Any) -> native.Job:
+        """Solve on threads of Rust's own; a mask (V,) or None for each target."""
+        return self._inpainting.start(mask=self._spread(masks), **params)
+
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the source other weights."""
+        self._inpainting.set_source_weights(rows, n_columns)
+
+    def split(self, values: NDArray) -> list[NDArray]:
+        """Values of all vertices, mirrored ones too, as those of each target's own."""
+        starts = np.cumsum([0, *(len(g.geometry.positions) for g in self.garments)], dtype=np.int64)
+        own = [garment.completion.n_own for garment in self.garments]
+        return [values[start : start + n] for start, n in zip(starts, own, strict=False)]
+
+    def rows_of(self, rows: Rows, number: int) -> Rows:
+        """The rows of one target's vertices, mirrored ones too."""
+        sizes = [len(garment.geometry.positions) for garment in self.garments]
+        start = sum(sizes[:number])
+        return csr.take_rows(rows, np.arange(start, start + sizes[number], dtype=np.int64))
+
+    def _own(self, values: NDArray) -> NDArray:
+        found = self.split(values)
+        return found[0] if len(found) == 1 else np.concatenate(found)
+
+    def _spread(self, masks: Sequence[NDArray[np.uint8] | None]) -> NDArray[np.uint8] | None:
+        if all(mask is None for mask in masks):
+            return None
+        full = [
+            np.ones(garment.completion.n_own, np.uint8) if mask is None else mask
+            for garment, mask in zip(self.garments, masks, strict=True)
+        ]
+        return np.concatenate([g.completion.spread(mask) for g, mask in zip(self.garments, full, strict=True)])
+
+
+def prepare(source: native.Source, garment: Garment, params: TransferParams) -> Prepared:
+    """One target laid over the body."""
+    return Prepared(source, [garment], params)
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
-    geometry = body.geometry
-    return native.Source(body.object.name, geometry.positions, geometry.triangles, rows, n_columns)
+    geometry: Geometry = body.geometry
+    return native.Source(body.name, geometry.positions, geometry.triangles, rows, n_columns)
 
 
-def _compute_one(
-    body: Body, garment: Garment, source: native.Source, fields: Rows | None, params: TransferParams
-) -> Jobs[Result]:
+def _compute_group(
+    body: Body, garments: list[Garment], source: native.Source, fields: Rows | None, params: TransferParams
+) -> Jobs[list[Result]]:
+    """The results of targets that are solved together."""
     start = time.perf_counter()
-    inpainting = prepare(source, garment, params)
+    prepared = Prepared(source, garments, params)
+    rows = [csr.empty(len(garment.writable)) for garment in garments]
     if body.bones:
-        transfer, rows = yield from bone_rows(inpainting, garment, params)
-        names = garment.names
-    else:
-        names, rows = [], csr.empty(len(garment.writable))
+        answers, rows = yield from _bone_rows(prepared, [g.mask for g in garments], params)
     if fields is not None:
         if body.bones:
-            # Points and factorisations are those of the bones: only the solve is done again.
-            inpainting.set_source_weights(fields, len(body.fields) + 1)
-        of_fields, rows_of_fields = yield from _field_rows(inpainting, garment, params, len(body.fields))
-        transfer = transfer if body.bones else of_fields
-        rows = csr.beside(rows_of_fields, len(body.fields), rows)
-        names = body.fields + names
-    return to_result(body, garment, transfer, names, rows, time.perf_counter() - start)
+            # Points and factorisations are those of the bones: the solve alone is done again.
+            prepared.set_source_weights(fields, len(body.fields) + 1)
+        of_fields, left = yield from _field_rows(prepared, body, params)
+        answers = answers if body.bones else of_fields
+        rows = [csr.beside(one, len(body.fields), other) for one, other in zip(left, rows, strict=True)]
+    names = body.fields if fields is not None else []
+    seconds = (time.perf_counter() - start) / len(garments)
+    return [
+        to_result(body, garment, answer, names + (garment.names if body.bones else []), row, seconds)
+        for garment, answer, row in zip(garments, answers, rows, strict=True)
+    ]
 
 
-def to_result(body: Body, garment: Garment, transfer: Any, names: list[str], rows: Rows, seconds: float) -> Result:
-    """The columns that were chosen, without locked groups, and the vertices that have a row."""
-    wanted = np.array([name in body.chosen - garment.locks for name in names], bool)
+def to_result(body: Body, garment: Garment, answer: Answer, names: list[str], rows: Rows, seconds: float) -> Result:
+    """The columns that are written, and the vertices that have a row.
+
+    Where only some bones are chosen, the others have made room and are written too.
+    """
+    bones = set(garment.names)
+    wanted_names = body.chosen if not body.chosen & bones else body.chosen | bones
+    held = {name for name, fixed in zip(garment.names, garment.held, strict=True) if fixed}
+    wanted = np.array([name in wanted_names - garment.locks - held for name in names], bool)
     # A vertex without a row is one the policy for islands leaves alone.
-    written = (np.diff(transfer.weights.indptr) > 0) & garment.writable
+    written = answer.has_row & garment.writable
     names = [name for name, kept in zip(names, wanted, strict=True) if kept]
-    return Result(transfer, names, csr.take_columns(rows, wanted), written, seconds)
+    return Result(answer.matched, answer.report, names, csr.take_columns(rows, wanted), written, seconds)
 
 
-def bone_rows(inpainting: native.Inpainting, garment: Garment, params: TransferParams) -> Jobs[tuple[Any, Rows]]:
-    """The library's answer and the rows over `garment.names`."""
-    joined = params.mix_factor < 1 or bool(garment.locked.any())
-    # Where old weights join in, the limit comes after them.
+def bone_rows(prepared: Prepared, garment: Garment, params: TransferParams) -> Jobs[tuple[Answer, Rows]]:
+    """The library's answer for one target and the rows over `garment.names`; its mask counts."""
+    answers, rows = yield from _bone_rows(prepared, [garment.mask], params)
+    return answers[0], rows[0]
+
+
+def _bone_rows(
+    prepared: Prepared, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams
+) -> Jobs[tuple[list[Answer], list[Rows]]]:
+    joined = any(_joins_old_weights(garment, params) for garment in prepared.garments)
+    # Where old weights or mirror images join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
-    transfer, rows = yield _start(inpainting, garment, params, limit)
-    _check(garment, rows, limit)
-    if joined:
-        rows = merging.merge(
-            rows,
-            garment.before,
-            locked=garment.locked,
-            factor=params.mix_factor,
-            max_influences=params.max_influences,
-        )
-    return transfer, rows
+    transfer, solved = yield prepared.start(masks, **_keywords(params, limit))
+    rows = []
+    for number, garment in enumerate(prepared.garments):
+        folded = garment.completion.fold(prepared.rows_of(solved, number), garment.opposite)
+        _check(garment, folded, limit)
+        rows.append(_merged(garment, folded, params) if joined else folded)
+    return _answers(prepared, transfer), rows
+
+
+def _joins_old_weights(garment: Garment, params: TransferParams) -> bool:
+    partial = not (garment.chosen | garment.held).all()
+    return params.mix_factor < 1 or partial or bool(garment.held.any()) or not garment.completion.is_plain
+
+
+def _merged(garment: Garment, rows: Rows, params: TransferParams) -> Rows:
+    return merging.merge(
+        rows,
+        garment.before,
+        held=garment.held,
+        chosen=garment.chosen,
+        factor=params.mix_factor,
+        max_influences=params.max_influences,
+    )
+
+
+def _answers(prepared: Prepared, transfer: Any) -> list[Answer]:
+    matched = prepared.split(transfer.matched)
+    has_row = prepared.split(np.diff(transfer.weights.indptr) > 0)
+    report = dict(transfer.report)
+    return [Answer(m, row, report) for m, row in zip(matched, has_row, strict=True)]
 
 
 def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
@@ -114,14 +258,19 @@ def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
         raise native.NativeError(f"{garment.object.name}: the answer is no set of weights; please report this")
 
 
-def _field_rows(
-    inpainting: native.Inpainting, garment: Garment, params: TransferParams, n: int
-) -> Jobs[tuple[Any, Rows]]:
-    transfer, rows = yield _start(inpainting, garment, params, max_influences=0)
-    return transfer, merging.mix(scalar_fields.unpack(rows, n), garment.fields_before, params.mix_factor)
+def _field_rows(prepared: Prepared, body: Body, params: TransferParams) -> Jobs[tuple[list[Answer], list[Rows]]]:
+    n = len(body.fields)
+    masks = [garment.mask for garment in prepared.garments]
+    transfer, solved = yield prepared.start(masks, **_keywords(params, max_influences=0))
+    same = np.arange(n + 1, dtype=np.int64)
+    rows = []
+    for number, garment in enumerate(prepared.garments):
+        folded = garment.completion.fold(prepared.rows_of(solved, number), same)
+        rows.append(merging.mix(scalar_fields.unpack(folded, n), garment.fields_before, params.mix_factor))
+    return _answers(prepared, transfer), rows
 
 
-def _start(inpainting: native.Inpainting, garment: Garment, params: TransferParams, max_influences: int) -> native.Job:
-    keywords = params.native() | {"mask": garment.mask, "max_influences": max_influences}
+def _keywords(params: TransferParams, max_influences: int) -> dict[str, Any]:
+    keywords = params.native() | {"max_influences": max_influences}
     del keywords["threads"]
-    return inpainting.start(**keywords)
+    return keywords

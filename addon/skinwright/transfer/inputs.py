@@ -1,4 +1,4 @@
-"""What a transfer reads from the body and from each garment."""
+"""What a transfer reads from the source and from each target."""
 
 import time
 from dataclasses import dataclass
@@ -7,10 +7,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import csr
 from ..csr import Rows
-from ..scene import armature, mask, mesh, vertex_groups
+from ..scene import armature, binding, mask, mesh, mirror, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
-from . import merging
+from . import completion, merging, parts
+from .completion import Completion
 from .params import Mask, TransferParams
 
 
@@ -18,76 +20,167 @@ from .params import Mask, TransferParams
 class Body:
     """The source as read.
 
-    The rows over `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks),
-    each carried over by itself. `chosen` names the groups to be written.
+    `objects` are the meshes that are its body, the picked one first; `rigs` the armatures that deform it. The rows over
+    `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks), each carried
+    over by itself. `chosen` names the groups to be written. `opposite` has the other side's bone of every bone.
     """
 
     object: bpy.types.Object
-    armature: bpy.types.Object | None
+    objects: list[bpy.types.Object]
+    rigs: list[bpy.types.Object]
     geometry: mesh.Geometry
     bones: list[str]
     bone_weights: Rows
     fields: list[str]
     field_weights: Rows
     chosen: set[str]
+    opposite: dict[str, str]
+
+    @property
+    def armature(self) -> bpy.types.Object | None:
+        """The armature that counts most."""
+        return self.rigs[0] if self.rigs else None
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether only some of its bones are written."""
+        return not set(self.bones) <= self.chosen
+
+    @property
+    def name(self) -> str:
+        """All its meshes."""
+        return " + ".join(obj.name for obj in self.objects)
 
 
 @dataclass(frozen=True)
 class Garment:
     """A target as read.
 
-    `locks` are all its locked groups. `names` are the body's bones, then bones locked on the target only; `locked`
-    marks those in `locks`. The old weights, over `names` and the body's fields, are empty where they take no part.
+    `shape` is what was seen, `completion` that with mirrored halves; `bound_in_pose` if it will get the rest shape from
+    which the pose leads to what was seen. `locks` are all its locked groups. `names` are the body's bones,
+    then the target's other bones; of these columns `held` marks those that stay as they are, `chosen` those that come
+    from the body, and `opposite` has the other side's. The old weights, over `names` and the body's fields, are empty
+    where they take no part.
     """
 
     object: bpy.types.Object
-    geometry: mesh.Geometry
+    shape: shapes.Shape
+    completion: Completion
+    bound_in_pose: bool
     mask: NDArray[np.uint8] | None
     writable: NDArray[np.bool_]
     locks: set[str]
     names: list[str]
-    locked: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    chosen: NDArray[np.bool_]
+    opposite: NDArray[np.int64]
     before: Rows
     fields_before: Rows
     seconds: float
 
+    @property
+    def geometry(self) -> mesh.Geometry:
+        """The shape that is solved."""
+        return self.completion.geometry
 
-def read_body(source: bpy.types.Object, params: TransferParams) -> Body:
-    """The source's shape and the weights of the groups that take part."""
-    rig = armature.find(source)
-    bones, chosen = choose_groups(source, rig, params.groups)
+
+def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bpy.types.Object] | None = None) -> Body:
+    """The source's shape and the weights of the groups that take part; `targets` are never part of it."""
+    objects = _body_objects(source, targets or [], params)
+    rigs = _rigs(objects)
+    bones, chosen = choose_groups(objects, rigs, params.groups)
     fields = [name for name in chosen if name not in bones]
+    with shapes.looked_at(objects, params.geometry):
+        seen = [shapes.read_source(obj, params.geometry, bones + fields) for obj in objects]
+    rows = parts.united_rows([rows for _, rows in seen])
+    bone_weights, field_weights = _split_columns(rows, len(bones))
     return Body(
         object=source,
-        armature=rig,
-        geometry=mesh.read(source, evaluated=params.evaluated),
+        objects=objects,
+        rigs=rigs,
+        geometry=parts.united([shape.geometry for shape, _ in seen]),
         bones=bones,
-        bone_weights=vertex_groups.read(source, bones),
+        bone_weights=bone_weights,
         fields=fields,
-        field_weights=vertex_groups.read(source, fields),
+        field_weights=field_weights,
         chosen=set(chosen),
+        opposite=sides.opposites(rigs[0] if rigs else None, bones),
     )
 
 
-def choose_groups(source: bpy.types.Object, rig: bpy.types.Object | None, subset: str) -> tuple[list[str], list[str]]:
+def _split_columns(rows: Rows, n_left: int) -> tuple[Rows, Rows]:
+    """Rows over the first `n_left` columns, and over the rest."""
+    last = int(rows.bones.max(initial=0))
+    left = np.arange(max(last + 1, n_left), dtype=np.int64) < n_left
+    return csr.take_columns(rows, left), csr.take_columns(rows, ~left)
+
+
+def _body_objects(
+    source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
+) -> list[bpy.types.Object]:
+    """The picked mesh and those it stands for."""
+    others = {
+        "OBJECT": lambda: [],
+        "PARTS": lambda: _continuing(source, targets),
+        "ARMATURE": lambda: armature.deformed_meshes(armature.rigs(source)),
+        "COLLECTION": lambda: mesh.in_collections_of(source),
+    }[params.source_scope]()
+    found = [source, *(obj for obj in others if obj != source and obj not in targets)]
+    return [obj for obj in found if obj == source or (obj.vertex_groups and obj.data.polygons)]
+
+
+def _continuing(source: bpy.types.Object, targets: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The visible meshes on the source's armature whose borders lie on its own, as the head of a body in parts."""
+    rigs = armature.rigs(source)
+    others = [o for o in armature.deformed_meshes(rigs) if o != source and o not in targets and o.data.polygons]
+    if not others or not source.data.polygons:
+        return []
+    try:
+        geometries = [mesh.read(obj) for obj in (source, *others)]
+    except SceneError:  # one of them cannot be read: the source itself is read next, and says so
+        return []
+    together = next(group for group in parts.groups(geometries) if 0 in group)
+    return [others[number - 1] for number in together if number]
+
+
+def _rigs(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The armatures that deform them, which must be the same for all."""
+    rigs = armature.rigs(objects[0]) or [rig for rig in [armature.find(objects[0])] if rig]
+    for obj in objects[1:]:
+        other = [rig for rig in armature.rigs(obj) if rig not in rigs]
+        if other:
+            raise SceneError(
+                f"{obj.name} is deformed by {other[0].name} and {objects[0].name} is not: "
+                "weights of one body follow one armature, so leave one of the meshes out"
+            )
+    return rigs
+
+
+def choose_groups(
+    objects: list[bpy.types.Object], rigs: list[bpy.types.Object], subset: str
+) -> tuple[list[str], list[str]]:
     """The groups that are bones, and those to be written. Without an armature all groups are, if all are wanted."""
-    groups = [group.name for group in source.vertex_groups]
+    source = objects[0]
+    groups = list(dict.fromkeys(group.name for obj in objects for group in obj.vertex_groups))
     if not groups:
         raise SceneError(f"{source.name} has no vertex groups to transfer: pick a body that has weights")
-    if rig is None:
+    if not rigs:
         return _choose_without_armature(source, groups, subset)
-    deforming = armature.deform_bones(rig)
+    deforming = set().union(*(armature.deform_bones(rig) for rig in rigs))
+    active = source.vertex_groups.active
     wanted = {
         "ALL": set(groups),
-        "ACTIVE": {groups[source.vertex_groups.active_index]},
+        "ACTIVE": {active.name if active else ""},
         "BONE_DEFORM": deforming,
-        "BONE_SELECT": deforming & armature.selected_bones(rig),
+        "BONE_SELECT": deforming.intersection(*[set().union(*(armature.selected_bones(rig) for rig in rigs))]),
     }[subset]
+    # Where only a group's vertices follow an armature, the targets need that group.
+    wanted = wanted | armature.masking_groups(source)
     chosen = [name for name in groups if name in wanted]
-    if not chosen:
+    if not set(chosen) - armature.masking_groups(source):
         kind = "selected deform bone" if subset == "BONE_SELECT" else "deform bone"
         raise SceneError(
-            f"No vertex group of {source.name} has the name of a {kind} of {rig.name}: "
+            f"No vertex group of {source.name} has the name of a {kind} of {rigs[0].name}: "
             "select other bones, rename the groups, or set Groups to All Groups"
         )
     return [name for name in groups if name in deforming], chosen
@@ -97,7 +190,7 @@ def _choose_without_armature(source: bpy.types.Object, groups: list[str], subset
     if subset == "ALL":
         return groups, groups
     if subset == "ACTIVE":
-        return [], [groups[source.vertex_groups.active_index]]
+        return [], [source.vertex_groups.active.name]
     raise SceneError(
         f"{source.name} has no armature to tell which of its groups are bones: "
         "give it an Armature modifier, or set Groups to All Groups"
@@ -108,27 +201,66 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
     """A target's shape, mask and locks; its old weights only where they take part in the new ones."""
     start = time.perf_counter()
     locks = vertex_groups.locked(target)
-    names = body.bones + sorted((locks & _bone_names(target, body)) - set(body.bones))
-    locked = np.array([name in locks for name in names], bool)
-    mixed = params.mix_factor < 1
+    own_bones = _bone_names(target, body) & {group.name for group in target.vertex_groups}
+    names = body.bones + sorted(own_bones - set(body.bones))
+    partial = body.is_partial
+    # Bones that the body lacks keep what they have, as locked ones do; where only some bones come, others make room.
+    held = np.array([name in locks or (not partial and name not in body.bones) for name in names], bool)
+    mixed = params.mix_factor < 1 or partial
+    with shapes.looked_at([target, *body.objects], params.geometry):
+        shape = shapes.read_target(target, params.geometry)
+        completed = _completed(target, shape, body, params)
     garment = Garment(
         object=target,
-        geometry=mesh.read(target, evaluated=params.evaluated),
+        shape=shape,
+        completion=completed,
+        bound_in_pose=_is_bound_in_pose(target, body, names, params),
         mask=read_mask(target, params.mask),
         writable=mesh.selected(target) if params.selected_only else np.ones(len(target.data.vertices), bool),
         locks=locks,
         names=names,
-        locked=locked,
-        before=vertex_groups.read(target, names if mixed or locked.any() else []),
-        fields_before=vertex_groups.read(target, body.fields if mixed else []),
+        held=held,
+        chosen=np.array([name in body.chosen for name in names], bool),
+        opposite=_opposite_columns(body),
+        before=vertex_groups.read(target, names if mixed or held.any() else []),
+        fields_before=vertex_groups.read(target, body.fields if params.mix_factor < 1 else []),
         seconds=time.perf_counter() - start,
     )
     _check_locks(garment)
     return garment
 
 
+def _completed(target: bpy.types.Object, shape: shapes.Shape, body: Body, params: TransferParams) -> Completion:
+    """With the halves that Mirror modifiers add, if they can tell left from right by the names."""
+    reflections = [] if sides.unflippable(body.opposite) else mirror.reflections(target, shape.matrix)
+    done = completion.complete(shape.geometry, reflections)
+    if params.symmetrize:
+        plane = (body.armature or body.object).matrix_world
+        done = completion.symmetrised(done, symmetry.opposite_vertices(shape.geometry.positions, plane))
+    return done
+
+
+def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], params: TransferParams) -> bool:
+    """Whether it was fitted on the posed body and does not follow the pose yet. Raises SceneError if it cannot."""
+    if params.geometry != "CURRENT" or not any(armature.is_posed(rig) for rig in body.rigs):
+        return False
+    follows = set(armature.rigs(target)) & set(body.rigs)
+    if not follows and (armature.find(target) or not params.add_armature):
+        return False  # another armature moves it, or none will
+    if follows and (vertex_groups.read(target, names).values > 0).any():
+        return False
+    binding.check(target, params.make_single_user)
+    return True
+
+
+def _opposite_columns(body: Body) -> NDArray[np.int64]:
+    """(B,) the column of the other side's bone; its own where the body has no such group."""
+    index = {name: column for column, name in enumerate(body.bones)}
+    return np.array([index.get(body.opposite[name], index[name]) for name in body.bones], np.int64)
+
+
 def _bone_names(target: bpy.types.Object, body: Body) -> set[str]:
-    rigs = {rig for rig in (body.armature, armature.find(target)) if rig}
+    rigs = {*body.rigs, *armature.rigs(target)}
     return set().union(*(armature.deform_bones(rig) for rig in rigs))
 
 
@@ -142,7 +274,8 @@ def read_mask(target: bpy.types.Object, settings: Mask | None = None) -> NDArray
 
 
 def _check_locks(garment: Garment) -> None:
-    overfull = merging.overfull(garment.before, garment.locked)
+    locked = np.array([name in garment.locks for name in garment.names], bool)
+    overfull = merging.overfull(garment.before, locked)
     if overfull.size:
         raise SceneError(
             f"The locked groups of {garment.object.name} sum to more than 1 at {overfull.size} vertices, "

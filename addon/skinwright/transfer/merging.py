@@ -10,25 +10,63 @@ from ..csr import Rows
 SUM_TOLERANCE = 1e-4
 
 
-def merge(transferred: Rows, before: Rows, *, locked: NDArray[np.bool_], factor: float, max_influences: int) -> Rows:
-    """Rows over the unlocked columns: `factor` of the transferred and the rest of the old weights.
+def merge(
+    transferred: Rows,
+    before: Rows,
+    *,
+    held: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
+    factor: float,
+    max_influences: int,
+) -> Rows:
+    """Rows over the columns that are not held: `factor` of the transferred and the rest of the old weights.
 
-    `transferred` and `before` share their columns; `locked` (B,) marks those held fixed. A row sums to what the locked
-    weights leave of 1 and, with them, has at most `max_influences` entries (0: no limit). Where only locked bones are
-    transferred, the old weights fill the rest. An empty transferred row stays empty: that vertex is not to be written.
+    `transferred` and `before` share their columns (B,); `held` marks those that stay as they are, `chosen` those that
+    are taken from the transfer. The others make room: they keep their proportions and fill what is left. A row sums to
+    what the held weights leave of 1 and, with them, has at most `max_influences` entries (0: no limit). An empty
+    transferred row stays empty: that vertex is not to be written.
     """
-    held = csr.keep_columns(before, locked)
-    remainder = np.clip(1 - csr.row_sums(held), 0, None)
+    written = np.diff(transferred.indptr) > 0
+    kept = csr.keep_columns(before, held)
+    remainder = np.clip(1 - csr.row_sums(kept), 0, None)
     remainder[remainder < SUM_TOLERANCE] = 0
-    rows = _scaled(csr.keep_columns(transferred, ~locked), remainder)
-    new_share = np.where(csr.row_sums(rows) > 0, factor, 0.0)
-    old_share = np.where(np.diff(transferred.indptr) > 0, 1 - new_share, 0.0)
-    if old_share.any():
-        rows = _scaled(_mixed(rows, csr.keep_columns(before, ~locked), new_share, old_share), remainder)
+    old = _only(csr.keep_columns(before, ~held), written)
+    if chosen[~held].all():
+        rows = _joined(_scaled(csr.keep_columns(transferred, ~held), remainder), old, factor, remainder)
+    else:
+        rows = _beside(csr.keep_columns(transferred, ~held & chosen), old, chosen, factor, remainder)
     if max_influences:
-        members = np.bincount(csr.entry_vertices(held)[held.values > 0], minlength=len(remainder))
+        members = np.bincount(csr.entry_vertices(kept)[kept.values > 0], minlength=len(remainder))
         rows = _scaled(csr.keep_largest(rows, np.maximum(max_influences - members, 0)), remainder)
     return rows
+
+
+def _joined(new: Rows, old: Rows, factor: float, remainder: NDArray[np.float64]) -> Rows:
+    """`factor` of the new and the rest of the old weights; the old alone where there are no new ones."""
+    new_share = np.where(csr.row_sums(new) > 0, factor, 0.0)
+    if (new_share == 1).all() or not old.values.size:
+        return new
+    return _scaled(_mixed(new, old, new_share, 1 - new_share), remainder)
+
+
+def _beside(new: Rows, old: Rows, chosen: NDArray[np.bool_], factor: float, remainder: NDArray[np.float64]) -> Rows:
+    """The chosen columns as they come, and the old weights of the others scaled to what that leaves."""
+    every = np.ones(len(remainder))
+    new = _mixed(new, csr.keep_columns(old, chosen), factor * every, (1 - factor) * every)
+    others = csr.keep_columns(old, ~chosen)
+    sums = np.minimum(csr.row_sums(new), remainder)
+    alone = csr.row_sums(others) <= 0
+    new = _scaled(new, np.where(alone, remainder, sums))
+    others = _scaled(others, np.where(alone, 0, remainder - sums))
+    return _mixed(new, others, every, every)
+
+
+def _only(rows: Rows, written: NDArray[np.bool_]) -> Rows:
+    """The entries of these rows alone."""
+    if written.all():
+        return rows
+    kept = written[csr.entry_vertices(rows)]
+    return csr.from_entries(csr.entry_vertices(rows)[kept], rows.bones[kept], rows.values[kept], len(written))
 
 
 def mix(transferred: Rows, before: Rows, factor: float) -> Rows:

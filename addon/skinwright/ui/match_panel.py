@@ -3,10 +3,10 @@
 import bpy
 from bpy.types import Context, Panel, UILayout
 
+from ..check import shown
+from ..match.painting import BRUSH_WEIGHTS, brush_value
 from ..match.session import current_of
 from .panel import Tab
-
-BRUSH_VALUES = (("Inpaint", 0.0), ("Automatic", 0.5), ("Match", 1.0))
 
 
 class SKINWRIGHT_PT_match(Tab, Panel):
@@ -37,12 +37,10 @@ def _draw_painting(layout: UILayout, context: Context) -> None:
     row.operator("skinwright.end_match_mask", text="Keep", icon="CHECKMARK").keep = True
     row.operator("skinwright.end_match_mask", text="Cancel", icon="X").keep = False
     row = layout.row(align=True)
-    path = "tool_settings.weight_paint" if bpy.app.version >= (5, 0, 0) else "tool_settings"
-    path += ".unified_paint_settings"
-    for text, value in BRUSH_VALUES:
-        pressed = abs(context.path_resolve(path).weight - value) < 0.01
-        button = row.operator("wm.context_set_float", text=text, depress=pressed)
-        button.data_path, button.value = path + ".weight", value
+    painted = brush_value(context)
+    for value in BRUSH_WEIGHTS:
+        button = row.operator("skinwright.mask_brush", text=value.title(), depress=painted == value)
+        button.value = value
     layout.prop(context.scene.skinwright.overlay, "live")
 
 
@@ -91,9 +89,24 @@ class SKINWRIGHT_PT_check(Tab, Panel):
     bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, _context: Context) -> None:
-        """Its settings are in the redo panel."""
-        self.layout.operator("skinwright.check_weights", icon="CHECKMARK")
+    def draw(self, context: Context) -> None:
+        """The button, and what it found on the active mesh; its settings are in the redo panel."""
+        layout = self.layout
+        layout.operator("skinwright.check_weights", icon="CHECKMARK")
+        result = shown.of(context.object)
+        if result is None:
+            return
+        column = layout.column(align=True)
+        for fault, count in result.counts().items():
+            if count:
+                column.label(text=f"{count:,} {fault.value}")
+        if not any(result.counts().values()):
+            column.label(text=f"Nothing wrong in {len(result.poses)} poses")
+        if result.worst:
+            column.label(text=f"Worst: {result.worst.name}")
+            row = layout.row(align=True)
+            row.operator("skinwright.show_worst_pose", icon="POSE_HLT")
+            row.prop_enum(context.scene.skinwright.overlay, "kind", "FAULTS")
 
 
 CLASSES = (SKINWRIGHT_PT_match, SKINWRIGHT_PT_match_edit, SKINWRIGHT_PT_overlay, SKINWRIGHT_PT_check)

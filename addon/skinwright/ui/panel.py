@@ -108,6 +108,7 @@ class SKINWRIGHT_PT_transfer_writing(_TransferStep, Panel):
     def draw(self, context: Context) -> None:
         """As the operator lays them out."""
         context.scene.skinwright.transfer.draw_writing(_settings_column(self.layout))
+        self.layout.operator("skinwright.reset_settings", icon="LOOP_BACK")
 
 
 def _settings_column(layout: UILayout) -> UILayout:

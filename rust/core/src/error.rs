@@ -100,6 +100,19 @@ pub enum Error {
         /// A vertex of the offending block.
         vertex: usize,
     },
+    /// A mesh without an inside for tetrahedra.
+    #[error(
+        "the mesh encloses nothing: no tetrahedron lies inside of it; it needs thickness, and normals that point outwards"
+    )]
+    NothingInside,
+    /// A mesh beyond what an operation can take.
+    #[error("the mesh has {found} vertices, but at most {most} can be refined; bake a lighter version")]
+    TooManyVertices {
+        /// Number of vertices.
+        found: usize,
+        /// The most there may be.
+        most: usize,
+    },
     /// The caller asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -1,15 +1,88 @@
-//! NumPy arrays in (any array-like, cast and copied once) and out (moved, read-only).
+//! NumPy arrays in (any array-like, cast exactly and copied once) and out (moved, read-only).
 
-use numpy::ndarray::ArrayView1;
-use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike1, PyArrayLike2, PyUntypedArrayMethods};
+use std::ops::Deref;
+
+use numpy::ndarray::{ArrayView1, Dimension, Ix1, Ix2, Ix3};
+use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike, PyReadonlyArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::error::InvalidParameter;
 
 /// A 1-D argument of any number type.
-pub type Vector<'py, T> = PyArrayLike1<'py, T, AllowTypeChange>;
+pub type Vector<'py, T> = Array<'py, T, Ix1>;
 /// A 2-D argument of any number type.
-pub type Matrix<'py, T> = PyArrayLike2<'py, T, AllowTypeChange>;
+pub type Matrix<'py, T> = Array<'py, T, Ix2>;
+/// A 3-D argument of any number type.
+pub type Stack<'py, T> = Array<'py, T, Ix3>;
+
+/// An array argument. Whole numbers are taken exactly: what does not fit the type is refused, never wrapped or cut.
+pub struct Array<'py, T: Element, D: Dimension>(PyArrayLike<'py, T, D, AllowTypeChange>);
+
+impl<'py, T: Element, D: Dimension> Deref for Array<'py, T, D> {
+    type Target = PyReadonlyArray<'py, T, D>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+/// What arrays hold.
+pub trait Number: Element {
+    /// Smallest and largest value of a type of whole numbers.
+    const WHOLE: Option<(f64, f64)> = None;
+}
+impl Number for bool {}
+impl Number for f32 {}
+impl Number for f64 {}
+impl Number for u8 {
+    const WHOLE: Option<(f64, f64)> = Some((0.0, 255.0));
+}
+impl Number for u32 {
+    const WHOLE: Option<(f64, f64)> = Some((0.0, 4_294_967_295.0));
+}
+impl Number for i32 {
+    const WHOLE: Option<(f64, f64)> = Some((-2_147_483_648.0, 2_147_483_647.0));
+}
+
+impl<'py, T: Number, D: Dimension + 'py> FromPyObject<'_, 'py> for Array<'py, T, D>
+where
+    PyArrayLike<'py, T, D, AllowTypeChange>: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Some((least, most)) = T::WHOLE {
+            check_whole(&object, least, most)?;
+        }
+        object.extract().map(Self)
+    }
+}
+
+/// Refuses entries that a type of whole numbers cannot hold.
+fn check_whole(object: &Bound<'_, PyAny>, least: f64, most: f64) -> PyResult<()> {
+    let array = object.py().import("numpy")?.call_method1("asarray", (object,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if array.getattr("size")?.extract::<usize>()? == 0 {
+        return Ok(());
+    }
+    if !"iufb".contains(&kind) {
+        return Err(PyTypeError::new_err("an array of whole numbers is needed"));
+    }
+    if kind == "f"
+        && !array.call_method1("__eq__", (array.call_method0("round")?,))?.call_method0("all")?.is_truthy()?
+    {
+        return Err(InvalidParameter::new_err("an array that must hold whole numbers holds fractions"));
+    }
+    for end in ["min", "max"] {
+        let value: f64 = array.call_method0(end)?.extract()?;
+        if !(least..=most).contains(&value) {
+            let holds = format!("an array of indices holds {value}, but must hold numbers from {least} to {most}");
+            return Err(InvalidParameter::new_err(holds));
+        }
+    }
+    Ok(())
+}
 
 /// Rows of an (N, 3) array; `name` is the argument's.
 pub fn triples<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {

@@ -7,6 +7,8 @@ use skinwright_core::desparsify::{self as core, Method, Skeleton};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::memory;
+use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
 
@@ -19,13 +21,13 @@ pub fn desparsify(
     py: Python<'_>,
     weights: &Weights,
     bone_parents: Vector<'_, i32>,
-    n: usize,
+    #[pyo3(from_py_with = ranges::members)] n: usize,
     method: &str,
     positions: Option<Matrix<'_, f32>>,
     triangles: Option<Matrix<'_, u32>>,
     bone_segments: Option<Stack<'_, f32>>,
     locked: Option<Vector<'_, bool>>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Weights> {
     let (method, weights, parents) = (method_of(method)?, weights.to_core(py)?, entries(&bone_parents));
     let positions = positions.map(|p| triples(&p, "positions")).transpose()?;
@@ -36,6 +38,7 @@ pub fn desparsify(
         return Err(InvalidParameter::new_err(needs));
     }
     let locked = locked.map(|l| entries(&l)).unwrap_or_default();
+    memory::expect("Desparsification", memory::of_desparsify(weights.vertex_count(), n))?;
     let result = enter(py, threads, || {
         let mesh = match (&positions, &triangles) {
             (Some(positions), Some(triangles)) if method == Method::Surface => {

@@ -28,7 +28,9 @@ pub fn to_python(error: Error) -> PyErr {
         Error::NoTriangles { .. }
         | Error::PositionNotFinite { .. }
         | Error::VertexOutOfRange { .. }
-        | Error::EdgeOutOfRange { .. } => InvalidMesh::new_err(sentence),
+        | Error::EdgeOutOfRange { .. }
+        | Error::NothingInside
+        | Error::TooManyVertices { .. } => InvalidMesh::new_err(sentence),
         Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {
             InvalidWeights::new_err(sentence)
         }
@@ -44,12 +46,15 @@ pub type Outcome<T> = Result<skinwright_core::Result<T>, String>;
 /// Runs `work` on `threads` threads (0: all of the machine's) and catches panics.
 pub fn run<T: Send>(threads: usize, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> Outcome<T> {
     let work = || match threads {
-        0 => work(),
-        n => rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads can be started").install(work),
+        0 => Ok(work()),
+        n => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+            pool.map(|pool| pool.install(work)).map_err(|error| format!("no {n} threads can be started: {error}"))
+        }
     };
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-        format!("internal error in Skinwright, please report it: {}", text.unwrap_or("unknown panic"))
+        Err(format!("internal error in Skinwright, please report it: {}", text.unwrap_or("unknown panic")))
     })
 }
 

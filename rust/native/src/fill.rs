@@ -7,6 +7,7 @@ use skinwright_core::{Progress, Weld};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::ranges;
 
 /// Fills in what is not known. `kinds` (V,): 0 free, 1 fixed, 2 soft. `rows` (V, C) hold the known values, `confidence` (V,)
 /// the b of `b |w - s|^2` of soft vertices. `weld` (V,): another vertex that is one with this one (or itself).
@@ -22,7 +23,7 @@ pub fn fill<'py>(
     confidence: Option<Vector<'_, f64>>,
     length: f64,
     weld: Option<Vector<'_, u32>>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
     let shape = [positions.len(), rows.shape()[1]];

@@ -11,6 +11,8 @@ use skinwright_core::transfer::{self as core, TargetMesh};
 use crate::arrays::{Matrix, pairs, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
+use crate::memory;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::source::Source;
 use crate::transfer::Transfer;
@@ -19,14 +21,15 @@ use crate::weights::Weights;
 /// Unknowns (U,) and their solution (U, n_bones).
 type RawWeights<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
 
-/// A body and a garment prepared for solving again and again: closest points are found once, a block of the system is
-/// factored again only when its own unknowns or the smoothness length change.
+/// A body and a garment prepared for solving again and again, for the settings given: what these do not change is done
+/// once. A block of the system is factored again only when its own unknowns or the smoothness length change.
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Inpainting {
     core: Arc<Mutex<core::Inpainting>>,
     distance: Py<PyArray1<f32>>,
     angle: Py<PyArray1<f32>>,
     islands: Py<PyArray1<u32>>,
+    n_bones: u32,
     threads: usize,
 }
 
@@ -41,22 +44,31 @@ impl Inpainting {
     }
 }
 
-/// The target's arrays.
+/// The target's arrays, if there is memory to prepare them.
 pub(crate) fn target_mesh(
     positions: &Matrix<'_, f32>,
     triangles: &Matrix<'_, u32>,
     edges: Option<&Matrix<'_, u32>>,
 ) -> PyResult<TargetMesh> {
-    Ok(TargetMesh {
+    let target = TargetMesh {
         positions: triples(positions, "target_positions")?,
         triangles: triples(triangles, "target_triangles")?,
         edges: edges.map(|edges| pairs(edges, "target_edges")).transpose()?.unwrap_or_default(),
-    })
+    };
+    let faces = target.triangles.len() + target.edges.len();
+    memory::expect("Preparing the target", memory::of_target(target.positions.len(), faces))?;
+    Ok(target)
 }
 
 /// A panic while solving leaves only kept blocks behind, and those are whole: a poisoned lock may be used on.
 fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting> {
     inpainting.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Raises MemoryError where solving for the vertices that do not match would take too much.
+pub(crate) fn expect_solve(matched: &[bool]) -> PyResult<()> {
+    let unknowns = matched.iter().filter(|&&matched| !matched).count();
+    memory::expect("The transfer", memory::of_solve(matched.len(), unknowns))
 }
 
 #[pymethods]
@@ -69,16 +81,16 @@ impl Inpainting {
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
         target_edges: Option<Matrix<'_, u32>>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let (settings, _) = keywords(settings)?;
         let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
-        let source = source.core.clone();
+        let (source, n_bones) = (source.core.clone(), source.core.n_bones());
         let core = enter(py, threads, || core::Inpainting::new(source, target, &settings, &Progress::default()))?;
         let (distance, angle) = (read_only(py, core.distances())?, read_only(py, core.angles())?);
         let islands = read_only(py, core.island_of_vertex())?;
-        Ok(Self { core: Arc::new(Mutex::new(core)), distance, angle, islands, threads })
+        Ok(Self { core: Arc::new(Mutex::new(core)), distance, angle, islands, n_bones, threads })
     }
 
     /// Distance of each vertex to its closest source point (V,), world units.
@@ -133,6 +145,7 @@ impl Inpainting {
     #[pyo3(signature = (**settings))]
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
+        expect_solve(&self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?)?;
         let solve =
             |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
         let transfer = self.enter(py, solve)?;
@@ -141,11 +154,16 @@ impl Inpainting {
 
     /// Starts `solve` on threads of its own.
     #[pyo3(signature = (**settings))]
-    fn start(&self, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
+    fn start(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
         let (settings, mask) = keywords(settings)?;
+        // While another job holds the target there is nobody to ask; that one was looked at.
+        if let Ok(mut held) = self.core.try_lock() {
+            let inpainting: &mut core::Inpainting = &mut held;
+            expect_solve(&enter(py, self.threads, || inpainting.matched(mask.as_deref(), &settings))?)?;
+        }
         let core = Arc::clone(&self.core);
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Ok(Job::start(self.threads, work))
+        Job::start(self.threads, work)
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other
@@ -153,6 +171,10 @@ impl Inpainting {
     #[pyo3(signature = (**settings))]
     fn raw_weights<'py>(&self, py: Python<'py>, settings: Option<&Bound<'py, PyDict>>) -> PyResult<RawWeights<'py>> {
         let (settings, mask) = keywords(settings)?;
+        let matched = self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?;
+        expect_solve(&matched)?;
+        let unknowns = matched.iter().filter(|&&matched| !matched).count() as u64;
+        memory::expect("An array of all bones", 16 * unknowns * u64::from(self.n_bones))?;
         let raw = self.enter(py, |inpainting| inpainting.raw_weights(mask.as_deref(), &settings))?;
         let n_bones = raw.values.len().checked_div(raw.vertices.len()).unwrap_or(0);
         let shape = [raw.vertices.len(), n_bones];

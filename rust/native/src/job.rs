@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use pyo3::prelude::*;
 use skinwright_core::Progress;
 
-use crate::error::{Outcome, finish, run};
+use crate::error::{Outcome, SkinwrightError, finish, run};
 use crate::transfer::Transfer;
 
 type TransferOutcome = Outcome<skinwright_core::transfer::Transfer>;
@@ -24,17 +24,18 @@ impl Job {
     pub fn start(
         threads: usize,
         work: impl FnOnce(&Progress) -> skinwright_core::Result<skinwright_core::transfer::Transfer> + Send + 'static,
-    ) -> Self {
+    ) -> PyResult<Self> {
         let progress = Arc::new(Progress::default());
         let seen = Arc::clone(&progress);
-        let thread = std::thread::spawn(move || run(threads, move || work(&seen)));
-        Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() }
+        let thread = std::thread::Builder::new().spawn(move || run(threads, move || work(&seen)));
+        let thread = thread.map_err(|error| SkinwrightError::new_err(format!("no thread can be started: {error}")))?;
+        Ok(Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() })
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<Py<Transfer>> {
         let thread = self.thread.lock().expect("never poisoned").take();
         let Some(thread) = thread else {
-            return Err(crate::error::SkinwrightError::new_err("another thread is waiting for this job"));
+            return Err(SkinwrightError::new_err("another thread is waiting for this job"));
         };
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
         Py::new(py, Transfer::of(py, finish(outcome)?)?)

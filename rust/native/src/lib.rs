@@ -6,6 +6,10 @@ mod error;
 mod fill;
 mod inpainting;
 mod job;
+mod memory;
+mod penetration;
+mod ranges;
+mod refine;
 mod sculpt;
 mod settings;
 mod skinning;
@@ -31,9 +35,15 @@ mod skinwright_native {
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]
+    use crate::memory::set_memory_budget;
+    #[pymodule_export]
+    use crate::penetration::penetration;
+    #[pymodule_export]
+    use crate::refine::{Refiner, intersecting_pairs};
+    #[pymodule_export]
     use crate::sculpt::{SculptSolver, Stroke, simplex_qp};
     #[pymodule_export]
-    use crate::skinning::linear_blend;
+    use crate::skinning::{dual_quaternion_blend, linear_blend};
     #[pymodule_export]
     use crate::source::{Source, transfer_weights};
     #[pymodule_export]

@@ -8,6 +8,8 @@ use skinwright_core::sculpt::{self as core, MAX_MEMBERS, Options, Residuals, Sim
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, SkinwrightError, enter};
+use crate::memory;
+use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
 
@@ -65,19 +67,25 @@ impl SculptSolver {
         rest_positions: Matrix<'_, f32>,
         weights: &Weights,
         locked: Option<Vector<'_, bool>>,
-        kappa: f64,
-        passes: usize,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::kappa)] kappa: f64,
+        #[pyo3(from_py_with = ranges::passes)] passes: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let (rest, weights) = (triples(&rest_positions, "rest_positions")?, weights.to_core(py)?);
         let locked = locked.map(|l| entries(&l)).unwrap_or_default();
         let options = Options { kappa, passes };
+        memory::expect("Sculpting", memory::of_sculpt(rest.len()))?;
         let solver = enter(py, threads, || core::SculptSolver::new(&rest, weights, &locked, options))?;
         Ok(Self { core: Mutex::new(Session { solver, pose: None }), threads })
     }
 
     /// Says how the next strokes are solved.
-    fn set_options(&self, py: Python<'_>, kappa: f64, passes: usize) -> PyResult<()> {
+    fn set_options(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = ranges::kappa)] kappa: f64,
+        #[pyo3(from_py_with = ranges::passes)] passes: usize,
+    ) -> PyResult<()> {
         self.enter(py, |session| session.solver.set_options(Options { kappa, passes }))
     }
 
@@ -129,7 +137,7 @@ impl SculptSolver {
         py: Python<'py>,
         vertices: Vector<'py, u32>,
         rest_positions: Matrix<'py, f32>,
-        pose: Option<usize>,
+        #[pyo3(from_py_with = ranges::pose)] pose: Option<usize>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let (pose, vertices) = (self.pose(py, pose)?, entries(&vertices));
         let rest = triples(&rest_positions, "rest_positions")?;
@@ -143,7 +151,7 @@ impl SculptSolver {
         py: Python<'_>,
         vertices: Vector<'_, u32>,
         targets: Matrix<'_, f32>,
-        pose: Option<usize>,
+        #[pyo3(from_py_with = ranges::pose)] pose: Option<usize>,
     ) -> PyResult<Stroke> {
         let (pose, vertices) = (self.pose(py, pose)?, entries(&vertices));
         let targets = triples(&targets, "targets")?;
@@ -195,14 +203,22 @@ impl SculptSolver {
 
     /// The vertices sculpted in a pose and what is left from each to its target, in pose space.
     #[pyo3(signature = (*, pose=None))]
-    fn residuals<'py>(&self, py: Python<'py>, pose: Option<usize>) -> PyResult<VerticesAndVectors<'py>> {
+    fn residuals<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = ranges::pose)] pose: Option<usize>,
+    ) -> PyResult<VerticesAndVectors<'py>> {
         let pose = self.pose(py, pose)?;
         present(py, self.enter(py, |session| session.solver.residuals(pose))?)
     }
 
     /// The same in rest space: the offsets of a corrective shape key.
     #[pyo3(signature = (*, pose=None))]
-    fn rest_residuals<'py>(&self, py: Python<'py>, pose: Option<usize>) -> PyResult<VerticesAndVectors<'py>> {
+    fn rest_residuals<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = ranges::pose)] pose: Option<usize>,
+    ) -> PyResult<VerticesAndVectors<'py>> {
         let pose = self.pose(py, pose)?;
         present(py, self.enter(py, |session| session.solver.rest_residuals(pose))?)
     }
@@ -214,7 +230,7 @@ impl SculptSolver {
         py: Python<'py>,
         vertices: Vector<'py, u32>,
         stiffness: f64,
-        rounds: usize,
+        #[pyo3(from_py_with = ranges::rounds)] rounds: usize,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Weights)> {
         let vertices = entries(&vertices);
         let shape = self.enter(py, |session| session.solver.fit_rest_shape(&vertices, stiffness, rounds))?;
@@ -230,7 +246,7 @@ pub fn simplex_qp<'py>(
     h: Stack<'py, f64>,
     g: Matrix<'py, f64>,
     start: Matrix<'py, f64>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let &[count, n] = start.shape() else { unreachable!("a 2-D array") };
     if h.shape() != [count, n, n] || g.shape() != [count, n] || !(1..=MAX_MEMBERS).contains(&n) {

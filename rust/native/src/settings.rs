@@ -1,5 +1,7 @@
 //! Settings of a transfer from keyword arguments.
 
+use std::f64::consts::PI;
+
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -7,6 +9,7 @@ use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, MatchMethod, Se
 
 use crate::arrays::{Vector, entries};
 use crate::error::{InvalidParameter, to_python};
+use crate::ranges::{count, whole, within};
 
 /// The names Python uses for the policies.
 pub(crate) fn policy_name(policy: IslandPolicy) -> &'static str {
@@ -48,26 +51,26 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
     let (mut settings, mut mask) = (Settings::default(), None);
     let (mut max_distance, mut smoothness_length) = (None, None);
     for (name, value) in keywords.into_iter().flatten() {
-        match name.extract::<&str>()? {
-            "max_distance" => max_distance = value.extract()?,
-            "relative_max_distance" => settings.max_distance = Length::Relative(value.extract()?),
-            "max_normal_angle" => settings.max_normal_angle = value.extract()?,
+        let name: &str = &name.extract::<String>()?;
+        match name {
+            "max_distance" => max_distance = length(name, &value)?,
+            "relative_max_distance" => settings.max_distance = Length::Relative(share(name, &value, 10.0)?),
+            "max_normal_angle" => settings.max_normal_angle = share(name, &value, PI)?,
             "match_flipped_normals" => settings.match_flipped_normals = value.extract()?,
-            "relative_weld_tolerance" => settings.weld_tolerance = Length::Relative(value.extract()?),
+            "relative_weld_tolerance" => settings.weld_tolerance = Length::Relative(share(name, &value, 0.01)?),
             "mask" => mask = mask_values(value.extract()?)?,
-            "smoothness_length" => smoothness_length = value.extract()?,
-            "relative_smoothness_length" => settings.smoothness_length = Length::Relative(value.extract()?),
-            "smoothing_iterations" => settings.smoothing_iterations = value.extract()?,
-            "smoothing_factor" => settings.smoothing_factor = value.extract()?,
-            "max_influences" => settings.max_influences = value.extract()?,
-            "method" => settings.method = named("method", value.extract()?, MatchMethod::ALL, method_name)?,
-            "softness" => settings.softness = value.extract()?,
+            "smoothness_length" => smoothness_length = length(name, &value)?,
+            "relative_smoothness_length" => settings.smoothness_length = Length::Relative(share(name, &value, 100.0)?),
+            "smoothing_iterations" => settings.smoothing_iterations = count(name, whole(&value)?, 0..=1000)? as u32,
+            "smoothing_factor" => settings.smoothing_factor = share(name, &value, 1.0)?,
+            "max_influences" => settings.max_influences = count(name, whole(&value)?, 0..=255)?,
+            "method" => settings.method = named(name, value.extract()?, MatchMethod::ALL, method_name)?,
+            "softness" => settings.softness = within(name, value.extract()?, 1e-3..=100.0)?,
             "island_policy" => {
-                settings.island_policy = named("island_policy", value.extract()?, IslandPolicy::ALL, policy_name)?;
+                settings.island_policy = named(name, value.extract()?, IslandPolicy::ALL, policy_name)?;
             }
             "small_islands" => {
-                let choice = value.extract()?;
-                settings.small_islands = named("small_islands", choice, SmallIslands::ALL, small_islands_name)?;
+                settings.small_islands = named(name, value.extract()?, SmallIslands::ALL, small_islands_name)?;
             }
             unknown => return Err(PyTypeError::new_err(format!("there is no setting named {unknown:?}"))),
         }
@@ -77,6 +80,16 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
     settings.smoothness_length = smoothness_length.map_or(settings.smoothness_length, Length::Absolute);
     settings.check().map_err(to_python)?;
     Ok((settings, mask))
+}
+
+/// A number from 0 to `most`.
+fn share(name: &str, value: &Bound<'_, PyAny>, most: f64) -> PyResult<f64> {
+    within(name, value.extract()?, 0.0..=most)
+}
+
+/// A length in world units, None for the relative one.
+fn length(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+    value.extract::<Option<f64>>()?.map(|length| within(name, length, 0.0..=1e9)).transpose()
 }
 
 fn mask_values(mask: Option<Vector<'_, u8>>) -> PyResult<Option<Vec<MaskValue>>> {

@@ -1,16 +1,15 @@
 //! `linear_blend`, and bone matrices from NumPy.
 
 use glam::DAffine3;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use skinwright_core::skinning as core;
 
+pub use crate::arrays::Stack;
 use crate::arrays::{Matrix, triples};
 use crate::error::{InvalidParameter, enter, to_python};
+use crate::ranges;
 use crate::weights::Weights;
-
-/// A 3-D argument of any number type.
-pub type Stack<'py, T> = PyArrayLike3<'py, T, AllowTypeChange>;
 
 /// One transform a bone from (B, 4, 4) row-major matrices.
 pub fn pose(matrices: &Stack<'_, f64>) -> PyResult<Vec<DAffine3>> {
@@ -39,9 +38,26 @@ pub fn linear_blend<'py>(
     rest_positions: Matrix<'py, f32>,
     weights: &Weights,
     pose_from_rest: Stack<'py, f64>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (rest, pose) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
     let weights = weights.to_core(py)?;
     vectors(py, enter(py, threads, || core::linear_blend(&rest, &weights, &pose))?)
+}
+
+/// Dual quaternion skinning as Blender's Armature modifier does it with Preserve Volume. `rest_bones` (B, 4, 4), the bones'
+/// rest matrices, matter only where bones scale.
+#[pyfunction]
+#[pyo3(signature = (rest_positions, weights, pose_from_rest, *, rest_bones=None, threads=0))]
+pub fn dual_quaternion_blend<'py>(
+    py: Python<'py>,
+    rest_positions: Matrix<'py, f32>,
+    weights: &Weights,
+    pose_from_rest: Stack<'py, f64>,
+    rest_bones: Option<Stack<'py, f64>>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let (rest, matrices) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
+    let (weights, bones) = (weights.to_core(py)?, rest_bones.as_ref().map(pose).transpose()?);
+    vectors(py, enter(py, threads, || core::dual_quaternion_blend(&rest, &weights, &matrices, bones.as_deref()))?)
 }

@@ -4,11 +4,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use skinwright_core::Progress;
 use skinwright_core::transfer as core;
 
 use crate::arrays::{Matrix, triples};
 use crate::error::enter;
-use crate::inpainting::target_mesh;
+use crate::inpainting::{expect_solve, target_mesh};
+use crate::memory;
+use crate::ranges;
 use crate::settings::keywords;
 use crate::transfer::Transfer;
 use crate::weights::Weights;
@@ -30,10 +33,11 @@ impl Source {
         positions: Matrix<'_, f32>,
         triangles: Matrix<'_, u32>,
         weights: &Weights,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
         let weights = weights.to_core(py)?;
+        memory::expect("Preparing the source", memory::of_source(positions.len(), triangles.len()))?;
         let core = enter(py, threads, || core::Source::new(&positions, triangles, weights))?;
         Ok(Self { core })
     }
@@ -45,7 +49,7 @@ impl Source {
         &self,
         py: Python<'py>,
         positions: Matrix<'_, f32>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<ClosestPoints<'py>> {
         let positions = triples(&positions, "positions")?;
         let (triangles, barycentric, distances) = enter(py, threads, || {
@@ -66,13 +70,19 @@ impl Source {
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
         target_edges: Option<Matrix<'_, u32>>,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
         let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
-        let transfer = enter(py, threads, || core::transfer_weights(&self.core, target, mask.as_deref(), &settings))?;
-        Transfer::of(py, transfer)
+        let (progress, mask) = (Progress::default(), mask.as_deref());
+        let (mut inpainting, matched) = enter(py, threads, || {
+            let mut inpainting = core::Inpainting::new(self.core.clone(), target, &settings, &progress)?;
+            let matched = inpainting.matched(mask, &settings)?;
+            Ok((inpainting, matched))
+        })?;
+        expect_solve(&matched)?;
+        Transfer::of(py, enter(py, threads, || inpainting.solve(mask, &settings, &progress))?)
     }
 }
 
@@ -93,7 +103,7 @@ pub fn transfer_weights(
     target_positions: Matrix<'_, f32>,
     target_triangles: Matrix<'_, u32>,
     target_edges: Option<Matrix<'_, u32>>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Transfer> {
     let source = Source::new(py, source_positions, source_triangles, source_weights, threads)?;

@@ -1,10 +1,12 @@
 //! Skin weights as CSR arrays.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 use crate::arrays::{Matrix, Vector, entries, read_only};
 use crate::error::to_python;
+use crate::ranges::{self, MOST_BONES};
 
 /// Skin weights as CSR: row i of `indptr` (V+1) spans the influences of vertex i in `bones` and `values` (nnz).
 #[pyclass(frozen, module = "skinwright_native")]
@@ -38,7 +40,7 @@ impl Weights {
         indptr: Vector<'_, u32>,
         bones: Vector<'_, u32>,
         values: Vector<'_, f32>,
-        n_bones: u32,
+        #[pyo3(from_py_with = ranges::n_bones)] n_bones: u32,
     ) -> PyResult<Self> {
         let (indptr, bones, values) = (entries(&indptr), entries(&bones), entries(&values));
         let weights = skinwright_core::Weights::new(indptr, bones, values, n_bones).map_err(to_python)?;
@@ -56,7 +58,7 @@ impl Weights {
             }
             indptr.push(bones.len() as u32);
         }
-        let n_bones = array.shape()[1] as u32;
+        let n_bones = ranges::count("the number of columns", array.shape()[1] as i64, 0..=MOST_BONES)? as u32;
         let weights = skinwright_core::Weights::new(indptr, bones, values, n_bones).map_err(to_python)?;
         Self::from_core(py, weights)
     }
@@ -65,6 +67,11 @@ impl Weights {
     fn to_dense<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let weights = self.to_core(py)?;
         let shape = [weights.vertex_count(), self.n_bones as usize];
+        // NumPy's own refusal of memory would be a panic.
+        if Vec::<f32>::new().try_reserve_exact(shape[0].saturating_mul(shape[1])).is_err() {
+            let bytes = 4 * shape[0] as u64 * shape[1] as u64;
+            return Err(PyMemoryError::new_err(format!("a dense array would take {bytes} bytes: keep the sparse one")));
+        }
         let dense = PyArray2::zeros(py, shape, false);
         {
             let mut rows = dense.readwrite();

@@ -9,16 +9,20 @@ from driver import EXTENSION, Steps, Window, until
 
 
 def brush(window: Window) -> None:
-    """Debian's 4.3 comes without brushes."""
+    """A brush where Blender has none: Debian's 4.3 comes without. Of its settings only the size is changed."""
     with window.context():
-        if bpy.context.tool_settings.weight_paint.brush is None:
+        settings = bpy.context.tool_settings
+        if settings.weight_paint.brush is None:
             bpy.data.brushes.new("Paint", mode="WEIGHT_PAINT").asset_mark()
             bpy.ops.brush.asset_activate(asset_library_type="LOCAL", relative_asset_identifier="Brush/Paint")
-        settings = bpy.context.tool_settings
         unified = getattr(settings.weight_paint, "unified_paint_settings", None) or settings.unified_paint_settings
-        unified.use_unified_weight = unified.use_unified_size = unified.use_unified_strength = True
-        unified.weight, unified.size, unified.strength = 0.0, 40, 1.0
-        settings.weight_paint.brush.weight = 0.0
+        (unified if unified.use_unified_size else settings.weight_paint.brush).size = 40
+
+
+def press(window: Window, value: str) -> None:
+    """The panel's button for what the brush paints."""
+    with window.context():
+        assert bpy.ops.skinwright.mask_brush("INVOKE_DEFAULT", value=value) == {"FINISHED"}
 
 
 def painting():
@@ -41,5 +45,6 @@ def begin_painting(window: Window) -> Steps:
         bpy.ops.skinwright.paint_match_mask("INVOKE_DEFAULT")
     yield 0.3
     brush(window)
+    press(window, "INPAINT")
     yield from until(lambda: painting().seconds)
     yield 0.4

@@ -1,19 +1,19 @@
 """Edit Match Mask: fill, grow, shrink, invert, clear, and set from the selection."""
 
-import bpy
 import numpy as np
 from bpy.props import EnumProperty
-from bpy.types import Context, Operator
+from bpy.types import Context, Object
 from numpy.typing import NDArray
 
-from ...match import session as match_session
 from ... import native
-from ...scene import mask, mesh
-from ...scene.error import SceneError
+from ...match import session as match_session
+from ...registration import registration
+from ...scene import mask, mesh, weight_state
+from ..base import SkinwrightOperator
 from .preview import begin, refusal, target
 
 
-class SKINWRIGHT_OT_edit_match_mask(Operator):
+class SKINWRIGHT_OT_edit_match_mask(SkinwrightOperator):
     """Works on the whole mask at once, without a brush."""
 
     bl_idname = "skinwright.edit_match_mask"
@@ -44,22 +44,16 @@ class SKINWRIGHT_OT_edit_match_mask(Operator):
     )
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
+    def refusal(cls, context: Context) -> str:
         """In Edit mode too, where the selection is made."""
-        reason = "" if context.mode == "EDIT_MESH" and target(context) else refusal(context)
-        cls.poll_message_set(reason)
-        return not reason
+        return native.problem() if context.mode == "EDIT_MESH" and target(context) else refusal(context)
 
-    def execute(self, context: Context) -> set[str]:
-        """Change the mask, and make one where there is none."""
+    def work(self, context: Context) -> set[str]:
+        """Change the mask, and make one where there is none; refused means unchanged."""
         obj = target(context)
-        try:
-            with mesh.object_mode(context):
-                values = self._changed(context, mask.values(obj, mask.ensure(obj)))
-                mask.write(obj, values)
-        except (SceneError, native.NativeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        with mesh.object_mode(context):
+            values = self._changed(context, mask.values(obj, obj.skinwright.mask_group))
+            _write(obj, values)
         counts = mask.counts(values)
         self.report({"INFO"}, f"{obj.name}: {counts[0]} vertices inpaint, {counts[2]} are forced to match")
         return {"FINISHED"}
@@ -80,11 +74,15 @@ class SKINWRIGHT_OT_edit_match_mask(Operator):
         return session.matched(session.match(context.scene.skinwright.transfer.to_params()))
 
 
-def register() -> None:
-    """Register the operator."""
-    bpy.utils.register_class(SKINWRIGHT_OT_edit_match_mask)
+def _write(obj: Object, values: mask.Values) -> None:
+    group = obj.skinwright.mask_group
+    try:
+        with weight_state.all_or_nothing([obj]):
+            mask.ensure(obj)
+            mask.write(obj, values)
+    except BaseException:
+        obj.skinwright.mask_group = group
+        raise
 
 
-def unregister() -> None:
-    """Unregister it."""
-    bpy.utils.unregister_class(SKINWRIGHT_OT_edit_match_mask)
+register, unregister = registration(SKINWRIGHT_OT_edit_match_mask)

@@ -4,8 +4,8 @@ import bpy
 from bpy.props import BoolProperty
 from bpy.types import Context, Event, Operator
 
-from ...match import session as match_session
 from ... import native, preferences
+from ...match import session as match_session
 from ...match.painting import MaskPainting
 from ...scene.error import SceneError
 from ...transfer.params import TransferParams

@@ -2,14 +2,16 @@
 
 import bpy
 from bpy.props import EnumProperty
-from bpy.types import Context, Object, Operator
+from bpy.types import Context, Object
 
-from ...match import session as match_session
 from ... import native, preferences
+from ...match import session as match_session
 from ...match.session import MatchSession
+from ...registration import registration
 from ...scene import attributes, mesh
 from ...scene.error import SceneError
 from ...transfer.params import TransferParams
+from ..base import SkinwrightOperator
 
 
 def target(context: Context) -> Object:
@@ -35,37 +37,33 @@ def refusal(context: Context) -> str:
 def begin(context: Context) -> MatchSession:
     """Prepare the active mesh and show its match. Raises SceneError or native.NativeError."""
     settings = context.scene.skinwright
+    if settings.transfer.source is None:
+        raise SceneError("There is no source to match: pick the body to transfer from as Source")
     params = settings.transfer.to_params(preferences.threads(context))
     match_session.current = MatchSession(settings.transfer.source, target(context), params)
     settings.overlay.kind = "MATCH"
     return match_session.current
 
 
-class _OnMatch(Operator):
+class _OnMatch(SkinwrightOperator):
     """What works on the match of the active mesh, preparing it where there is none on show."""
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        """Cheap, as it runs on every redraw."""
-        reason = refusal(context)
-        cls.poll_message_set(reason)
-        return not reason
+    def refusal(cls, context: Context) -> str:
+        """As for every look at the match."""
+        return refusal(context)
 
-    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
+    def on_match(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Do it, and say what was done."""
         raise NotImplementedError
 
-    def execute(self, context: Context) -> set[str]:
+    def work(self, context: Context) -> set[str]:
         """Work on the match, or say why there is none."""
         obj = target(context)
-        try:
-            session = match_session.current_of(obj) or begin(context)
-            params = context.scene.skinwright.transfer.to_params()
-            session.read_mask(obj)
-            self.report({"INFO"}, self.work(obj, session, params))
-        except (SceneError, native.NativeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        session = match_session.current_of(obj) or begin(context)
+        params = context.scene.skinwright.transfer.to_params()
+        session.read_mask(obj)
+        self.report({"INFO"}, self.on_match(obj, session, params))
         return {"FINISHED"}
 
 
@@ -77,16 +75,16 @@ class SKINWRIGHT_OT_preview_match(_OnMatch):
     bl_description = "Colour the active mesh by what would match and what would be inpainted; weights are not touched"
     bl_options = {"REGISTER"}
 
-    def execute(self, context: Context) -> set[str]:
+    def work(self, context: Context) -> set[str]:
         """On a second press the overlay goes."""
         overlay = context.scene.skinwright.overlay
         if overlay.kind == "MATCH" and match_session.current_of(target(context)):
             overlay.kind, match_session.current = "NONE", None
             return {"FINISHED"}
         match_session.current = None
-        return super().execute(context)
+        return super().work(context)
 
-    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
+    def on_match(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Shown by the overlay; here in numbers."""
         counts = session.match(params).counts().tolist()
         matched = counts[0] + counts[2]
@@ -112,7 +110,14 @@ class SKINWRIGHT_OT_select_match(_OnMatch):
         ],
     )
 
-    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
+    @classmethod
+    def refusal(cls, context: Context) -> str:
+        """What is hidden has no Edit mode."""
+        obj = target(context)
+        hidden = obj is not None and not obj.visible_get()
+        return refusal(context) or (f"{obj.name} is hidden: show it to select in it" if obj and hidden else "")
+
+    def on_match(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Go to Edit mode with the vertices selected."""
         chosen = session.chosen(self.what, session.match(params), mesh.selected(obj))
         if obj.mode != "OBJECT":
@@ -131,7 +136,7 @@ class SKINWRIGHT_OT_store_match(_OnMatch):
     bl_description = "Keep matched, distance and angle as named attributes of the active mesh, for Geometry Nodes"
     bl_options = {"REGISTER", "UNDO"}
 
-    def work(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
+    def on_match(self, obj: Object, session: MatchSession, params: TransferParams) -> str:
         """Three attributes on vertices."""
         inpainting = session.inpainting
         matched = session.matched(session.match(params))
@@ -141,16 +146,4 @@ class SKINWRIGHT_OT_store_match(_OnMatch):
         return f"{obj.name}: skinwright_matched, skinwright_distance and skinwright_angle stored"
 
 
-CLASSES = (SKINWRIGHT_OT_preview_match, SKINWRIGHT_OT_select_match, SKINWRIGHT_OT_store_match)
-
-
-def register() -> None:
-    """Register the operators."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Unregister them."""
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = registration(SKINWRIGHT_OT_preview_match, SKINWRIGHT_OT_select_match, SKINWRIGHT_OT_store_match)

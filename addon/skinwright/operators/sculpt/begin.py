@@ -4,8 +4,8 @@ import bpy
 from bpy.types import Context
 
 from ... import native, preferences
-from ...sculpt import session as sculpt_session
 from ...scene import sculpting
+from ...sculpt import session as sculpt_session
 from ...sculpt.session import SculptSession
 from . import undo as sculpt_undo
 

@@ -8,12 +8,14 @@ import bpy
 from bpy.types import Context, Event, Operator
 
 from ... import native
-from ...sculpt import session as sculpt_session
 from ...scene import mesh
 from ...scene.error import SceneError
+from ...sculpt import session as sculpt_session
 from ...sculpt.session import SculptSession
 from ..modal import held_input, timers
-from . import begin as sculpt_begin, keys as sculpt_keys, undo as sculpt_undo
+from . import begin as sculpt_begin
+from . import keys as sculpt_keys
+from . import undo as sculpt_undo
 from .watch import StrokeWatch
 
 # While posing between strokes, Object and Pose mode belong to the session too.

@@ -95,6 +95,13 @@ impl Source {
         self.geometry.size
     }
 
+    /// World position of a point of the surface.
+    pub(super) fn position(&self, point: &SurfacePoint) -> DVec3 {
+        let corners = self.geometry.triangles[point.triangle as usize];
+        let corner = |i: u32| Vec3::from(self.geometry.positions[i as usize]).as_dvec3();
+        std::iter::zip(corners, point.barycentric).map(|(i, share)| corner(i) * share).sum()
+    }
+
     /// Area of triangle `t`.
     pub(super) fn area(&self, t: u32) -> f64 {
         self.geometry.areas[t as usize].into()
@@ -125,12 +132,6 @@ impl Source {
             }
         }
         merge_and_normalise(row, start);
-    }
-
-    /// Position of a surface point.
-    pub(super) fn position(&self, point: &SurfacePoint) -> DVec3 {
-        let corners = self.geometry.triangles[point.triangle as usize].map(|i| self.geometry.positions[i as usize]);
-        std::iter::zip(corners, point.barycentric).map(|(p, share)| Vec3::from(p).as_dvec3() * share).sum()
     }
 
     /// Whether a position lies behind the triangle of a surface point.

@@ -1,24 +1,24 @@
 //! The face that looks the right way, for vertices that would match one that looks the other way.
 //!
 //! The inside of a trouser leg often lies nearer to the other thigh than to its own, or even in it. Where a flipped match
-//! would take such a vertex to the other limb, the nearest face with an agreeing normal is taken instead. A lining does have
-//! its own limb's face nearest, flipped: what it would be taken to lies beyond the garment's outer layer.
+//! would take such a vertex to the other limb, the nearest face with an agreeing normal is taken instead. A lining between two
+//! limbs looks exactly the same, vertex by vertex; but around such a patch of it all others match flipped, while around
+//! that of a trouser leg they match upright. So the vertices around a patch decide for it.
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Criteria, TargetSurface, angle};
-use crate::mesh::TriMesh;
-use crate::surface::{Bound, Priced, SurfaceIndex, SurfacePoint};
+use crate::adjacency::DisjointSets;
+use crate::surface::{Bound, Priced, SurfacePoint};
 use crate::transfer::Source;
 
 /// For a vertex in front of the flipped face, an agreeing one is looked for within this many times its distance, or this share
 /// of the source's diagonal.
 const REACH: (f64, f64) = (4.0, 0.01);
 
-/// The vertices to move and their points: of those whose `closest` point would match flipped, the ones that see a point
+/// The vertices to move and their points: of those whose `closest` point would match flipped, the ones that have a point
 /// that looks the right way. Ascending.
 pub(super) fn find(
     source: &Source,
@@ -36,12 +36,59 @@ pub(super) fn find(
         is_near && !criteria.accepts_upright(angle) && !target.two_sided[i as usize]
     };
     let flipped: Vec<u32> = (0..closest.len() as u32).into_par_iter().with_min_len(1024).filter(is_flipped).collect();
-    let is_inside = |i: u32| source.is_behind(&closest[i as usize], target.positions[i as usize]);
-    let mut found = agreeing(source, target, closest, criteria, &flipped, &is_inside);
-    let seen = sees(source, target, &found, &is_inside);
-    let mut seen = seen.into_iter();
-    found.retain(|_| seen.next().expect("one each"));
+    let mut found = agreeing(source, target, closest, criteria, &flipped);
+    if found.is_empty() {
+        return found;
+    }
+    let sides: Vec<Side> = (0..closest.len())
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|i| Side::of(closest[i].distance, angles[i], criteria))
+        .collect();
+    let is_upright = patches_among_upright(target, &found, sides);
+    let mut is_upright = is_upright.into_iter();
+    found.retain(|_| is_upright.next().expect("one each"));
     found
+}
+
+/// How a vertex matches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Side {
+    Neither,
+    Upright,
+    Flipped,
+    /// One of those that an agreeing face was found for.
+    Open,
+}
+
+impl Side {
+    fn of(distance: f64, angle: f32, criteria: &Criteria) -> Self {
+        match (distance <= criteria.max_distance, criteria.accepts_upright(angle)) {
+            (true, true) => Self::Upright,
+            (true, false) if criteria.accepts_angle(angle) => Self::Flipped,
+            _ => Self::Neither,
+        }
+    }
+}
+
+/// For each vertex `found`, whether more of those around its patch match upright than flipped.
+fn patches_among_upright(target: TargetSurface<'_>, found: &[(u32, SurfacePoint)], mut sides: Vec<Side>) -> Vec<bool> {
+    found.iter().for_each(|&(i, _)| sides[i as usize] = Side::Open);
+    let side = |i: u32| sides[i as usize];
+    let touching = || target.triangles.iter().filter(|t| t.iter().any(|&i| side(i) == Side::Open));
+    let mut patches = DisjointSets::new(sides.len());
+    for t in touching() {
+        let mut open = t.iter().filter(|&&i| side(i) == Side::Open);
+        let first = *open.next().expect("this triangle touches one");
+        open.for_each(|&i| patches.union(first, i));
+    }
+    let mut votes = vec![0i64; sides.len()];
+    for t in touching() {
+        let open = *t.iter().find(|&&i| side(i) == Side::Open).expect("this triangle touches one");
+        votes[patches.find(open) as usize] += t.iter().map(|&i| i64::from(side(i) == Side::Upright)).sum::<i64>();
+        votes[patches.find(open) as usize] -= t.iter().map(|&i| i64::from(side(i) == Side::Flipped)).sum::<i64>();
+    }
+    found.iter().map(|&(i, _)| votes[patches.find(i) as usize] > 0).collect()
 }
 
 /// The nearest point in front of which a vertex lies and whose normal agrees, where there is one within reach.
@@ -51,12 +98,12 @@ fn agreeing(
     closest: &[SurfacePoint],
     criteria: &Criteria,
     flipped: &[u32],
-    is_inside: &(impl Fn(u32) -> bool + Sync),
 ) -> Vec<(u32, SurfacePoint)> {
     let queries: Vec<[f32; 3]> = flipped.iter().map(|&i| target.positions[i as usize]).collect();
     let reach = |&i: &u32| {
         let reach = (REACH.0 * closest[i as usize].distance).max(REACH.1 * source.diagonal());
-        let reach = if is_inside(i) { criteria.max_distance } else { reach.min(criteria.max_distance) };
+        let is_inside = source.is_behind(&closest[i as usize], target.positions[i as usize]);
+        let reach = if is_inside { criteria.max_distance } else { reach.min(criteria.max_distance) };
         Bound { near: 0.0, cost: reach * reach }
     };
     let bounds: Vec<Bound> = flipped.par_iter().map(reach).collect();
@@ -72,53 +119,4 @@ fn agreeing(
 fn nearest(found: &[Priced]) -> Option<SurfacePoint> {
     let finite = found.iter().filter(|priced| priced.cost.is_finite());
     finite.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|priced| priced.point)
-}
-
-/// Whether no layer of the target lies between a vertex and the point found for it. A vertex inside the body is not asked.
-fn sees(
-    source: &Source,
-    target: TargetSurface<'_>,
-    found: &[(u32, SurfacePoint)],
-    is_inside: &(impl Fn(u32) -> bool + Sync),
-) -> Vec<bool> {
-    let asked: Vec<bool> = found.par_iter().map(|&(i, _)| !is_inside(i)).collect();
-    if !asked.contains(&true) {
-        return vec![true; found.len()];
-    }
-    let mesh = TriMesh::of_checked(target.positions, target.triangles);
-    let index = SurfaceIndex::new(&mesh);
-    let ends = |(i, point): &(u32, SurfacePoint)| {
-        (Vec3::from(target.positions[*i as usize]).as_dvec3(), source.position(point))
-    };
-    let middles: Vec<[f32; 3]> = found.iter().map(ends).map(|(a, b)| a.midpoint(b).as_vec3().to_array()).collect();
-    let bound = |(is_asked, point): (&bool, &(u32, SurfacePoint))| {
-        // The ball around the segment, a shade larger than rounding needs.
-        let radius = if *is_asked { 0.51 * point.1.distance } else { 0.0 };
-        Bound { near: 0.0, cost: radius * radius }
-    };
-    let bounds: Vec<Bound> = std::iter::zip(&asked, found).map(bound).collect();
-    let cost = |k: usize, point: &SurfacePoint| {
-        let triangle = target.triangles[point.triangle as usize];
-        let (a, b) = ends(&found[k]);
-        let crosses = !triangle.contains(&found[k].0) && crosses(a, b, triangle.map(|i| mesh.position(i)));
-        if crosses { point.distance * point.distance } else { f64::INFINITY }
-    };
-    let is_crossed = index.cheapest_points(&middles, &bounds, 1.0, cost, |_, found| nearest(found).is_some());
-    std::iter::zip(asked, is_crossed).map(|(is_asked, is_crossed)| !(is_asked && is_crossed)).collect()
-}
-
-/// Whether the segment from `a` to `b` goes through the triangle (Möller and Trumbore 1997).
-fn crosses(a: DVec3, b: DVec3, [p, q, r]: [DVec3; 3]) -> bool {
-    let (direction, pq, pr) = (b - a, q - p, r - p);
-    let normal = direction.cross(pr);
-    let determinant = pq.dot(normal);
-    if determinant == 0.0 {
-        return false;
-    }
-    let from_p = a - p;
-    let u = from_p.dot(normal) / determinant;
-    let across = from_p.cross(pq);
-    let v = direction.dot(across) / determinant;
-    let along = pr.dot(across) / determinant;
-    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&along)
 }

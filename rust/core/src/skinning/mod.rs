@@ -1,4 +1,8 @@
-//! Linear blend skinning, exactly as Blender's Armature modifier does it.
+//! Skinning, exactly as Blender's Armature modifier does it: linear, or by dual quaternions.
+
+mod dual_quaternion;
+
+pub use dual_quaternion::{DualQuaternion, blended_position, dual_quaternion_blend};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;

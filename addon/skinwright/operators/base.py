@@ -1,0 +1,91 @@
+"""What every operator has in common: refusal in a sentence, targets, and one net under all of its work."""
+
+from collections.abc import Callable, Sequence
+
+from bpy.types import Context, Object, Operator
+
+from .. import native
+from ..errors import Refused, internal
+from ..stored import keeping
+
+# The modes of operators that work on meshes as they are selected.
+MESH_MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
+
+# Operators that hold weights of their own while they run.
+_SESSIONS = {
+    "SKINWRIGHT_OT_sculpt_weights": "Sculpt Weights",
+    "SKINWRIGHT_OT_paint_match_mask": "Paint Match Mask",
+}
+
+
+class SkinwrightOperator(Operator):
+    """Base of the operators: `refusal` says why not, `work` does it, and no exception leaves `attempt`."""
+
+    @classmethod
+    def refusal(cls, context: Context) -> str:
+        """Why the operator cannot run now, or nothing. Cheap, as it runs on every redraw."""
+        raise NotImplementedError
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        """Blender shows the sentence as the tooltip of the greyed button."""
+        reason = cls.refusal(context)
+        cls.poll_message_set(reason)
+        return not reason
+
+    def work(self, context: Context) -> set[str]:
+        """What `execute` does; may raise."""
+        raise NotImplementedError
+
+    def execute(self, context: Context) -> set[str]:
+        """Work, or say why not."""
+        return self.attempt(lambda: self.work(context))
+
+    def attempt(self, work: Callable[[], set[str]]) -> set[str]:
+        """What `work` returns; an exception becomes a sentence."""
+        try:
+            return work()
+        except Refused as refused:
+            self.report({"ERROR"}, str(refused))
+        except Exception as error:
+            self.report({"ERROR"}, f"{self.bl_label}: {internal(error)}")
+        return {"CANCELLED"}
+
+    def keep_before(self, objects: Sequence[Object]) -> None:
+        """Keep the weights of `objects` in the file, as they are before this operator writes."""
+        keeping.keep_before(objects, self.bl_label)
+
+    def tell(self, sentence: str, warnings: list[str]) -> set[str]:
+        """The result, and then what is worth a look, as the status bar shows the last report."""
+        self.report({"INFO"}, sentence)
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
+        return {"FINISHED"}
+
+
+def selected_meshes(context: Context, *, without: Object | None = None) -> list[Object]:
+    """The selected meshes; while painting or editing the active one is always among them."""
+    meshes = [obj for obj in context.selected_objects if obj.type == "MESH"]
+    active = context.active_object
+    if context.mode != "OBJECT" and active and active.type == "MESH" and active not in meshes:
+        meshes.append(active)
+    return [obj for obj in meshes if obj != without]
+
+
+def refusal_in_mode(context: Context, purpose: str) -> str:
+    """Why nothing can be done to meshes now, or nothing; `purpose` ends the sentence."""
+    if native.problem():
+        return native.problem()
+    session = session_under_way(context)
+    if session:
+        return f"End {session} first: its weights would be written over these, or these over its"
+    if context.mode not in MESH_MODES:
+        return f"Go to Object, Edit or Weight Paint mode to {purpose}"
+    return ""
+
+
+def session_under_way(context: Context) -> str:
+    """The label of the operator that sculpts or paints in some window, or nothing."""
+    windows = context.window_manager.windows
+    running = {operator.bl_idname for window in windows for operator in window.modal_operators}
+    return next((label for name, label in _SESSIONS.items() if name in running), "")

@@ -1,0 +1,3 @@
+import bpy
+
+bpy.ops.skinwright.reset_settings()

@@ -1,0 +1,45 @@
+"""Objects from files: .blend files are appended, the others imported by Blender's own importers."""
+
+from pathlib import Path
+
+import bpy
+
+from .error import SceneError
+
+
+def empty() -> None:
+    """Forget the open file for an empty one."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def load(path: Path) -> list[bpy.types.Object]:
+    """Add the objects of a file to the open scene, by name. Raises SceneError for a file that cannot be read."""
+    if not path.is_file():
+        raise SceneError(f"There is no file {path}")
+    before = set(bpy.data.objects)
+    try:
+        _LOADERS[path.suffix.lower()](path)
+    except KeyError as error:
+        raise SceneError(f"{path} is of a kind that cannot be read: use {', '.join(_LOADERS)}") from error
+    except (RuntimeError, OSError) as error:
+        raise SceneError(f"{path} cannot be read: {error}") from error
+    return sorted(set(bpy.data.objects) - before, key=lambda obj: obj.name)
+
+
+def _append(path: Path) -> None:
+    with bpy.data.libraries.load(str(path), link=False) as (there, here):
+        here.objects = there.objects
+    for obj in here.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+
+
+def _import_gltf(path: Path) -> None:
+    bpy.ops.import_scene.gltf(filepath=str(path))
+
+
+def _import_fbx(path: Path) -> None:
+    bpy.ops.import_scene.fbx(filepath=str(path))
+
+
+_LOADERS = {".blend": _append, ".glb": _import_gltf, ".gltf": _import_gltf, ".fbx": _import_fbx}

@@ -1,0 +1,33 @@
+"""Points that lie at one place. Numpy only."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+_PRIMES = np.array([73856093, 19349663, 83492791], np.int64)
+
+
+def coincident(a: NDArray[np.float32], b: NDArray[np.float32], tolerance: float) -> NDArray[np.int64]:
+    """For each point of `b` (n, 3) a point of `a` (m, 3) within the tolerance, -1 where there is none."""
+    cell = 4 * max(tolerance, 1e-30)
+    keys = _keys(a, cell, 0.0)
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    found = np.full(len(b), -1, np.int64)
+    for corner in np.ndindex(2, 2, 2) if len(a) else ():
+        still = np.flatnonzero(found < 0)
+        wanted = _keys(b[still], cell, (2 * np.array(corner) - 1) * tolerance)
+        near = order[np.minimum(np.searchsorted(ordered, wanted), len(a) - 1)]
+        close = (keys[near] == wanted) & (np.linalg.norm(a[near] - b[still], axis=1) <= tolerance)
+        found[still[close]] = near[close]
+    return found
+
+
+def first_at_each(positions: NDArray[np.float32], tolerance: float) -> NDArray[np.int64]:
+    """(V,) for each point one of those at its place, the same for all of them."""
+    near = coincident(positions, positions, tolerance)
+    same = near[near]  # what one cell sends on to the next
+    return np.minimum(same, np.arange(len(positions), dtype=np.int64))
+
+
+def _keys(points: NDArray[np.float32], cell: float, shift: float | NDArray[np.float64]) -> NDArray[np.int64]:
+    return (np.floor((points.astype(np.float64) + shift) / cell).astype(np.int64) * _PRIMES).sum(axis=1, dtype=np.int64)

@@ -1,0 +1,133 @@
+"""An object's shape in three ways: its mesh alone, as it is shown but in rest pose, or as it is shown now."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..csr import Rows
+from . import armature, mesh, modifiers, poses, vertex_groups
+from .error import SceneError
+
+# REST is the mesh alone (with shape keys its Basis); AS_SHOWN adds shape keys in use and modifiers, but no pose;
+# CURRENT is what the viewport shows.
+Look = Literal["REST", "AS_SHOWN", "CURRENT"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What was seen of an object: `matrix` (4, 4) is its place in the world, `unseen` names what was left out."""
+
+    geometry: mesh.Geometry
+    matrix: NDArray[np.float64]
+    unseen: list[str]
+
+
+@contextmanager
+def looked_at(objects: list[bpy.types.Object], look: Look) -> Iterator[None]:
+    """Show the rest pose of every armature that moves one of these objects, unless the pose is what is looked at."""
+    moving = armature.moving(objects) if look == "AS_SHOWN" else []
+    with ExitStack() as stack:
+        for rig in moving:
+            if armature.is_posed(rig):
+                stack.enter_context(poses.at_rest(rig))
+        yield
+
+
+def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Shape, Rows]:
+    """Shape and weights in the groups `names`, of the vertices that all its modifiers leave; inside `looked_at`."""
+    if look == "REST" or not _is_shaped(obj, look):
+        return _plain(obj), vertex_groups.read(obj, names)
+    with _evaluable(obj) as shown:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        evaluated = shown.evaluated_get(depsgraph)
+        seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        try:
+            geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), mesh.triangles_of(obj, seen))
+            rows = vertex_groups.read_evaluated(evaluated, seen, names)
+        finally:
+            evaluated.to_mesh_clear()
+        return Shape(geometry, np.array(shown.matrix_world), []), rows
+
+
+def read_target(obj: bpy.types.Object, look: Look) -> Shape:
+    """The shape of the mesh's own vertices, by the modifiers that keep them; inside `looked_at`."""
+    if look == "REST" or not _is_shaped(obj, look):
+        return _plain(obj)
+    with _evaluable(obj) as shown:
+        local, unseen = _kept_positions(shown, look)
+        geometry = mesh.placed(obj, shown.matrix_world, local, mesh.triangles(obj))
+        return Shape(geometry, np.array(shown.matrix_world), unseen)
+
+
+def _plain(obj: bpy.types.Object) -> Shape:
+    return Shape(mesh.read(obj), np.array(obj.matrix_world), [])
+
+
+def _is_shaped(obj: bpy.types.Object, look: Look) -> bool:
+    """Whether anything but the mesh itself makes the shape."""
+    shown = modifiers.shown(obj)
+    shaping = any(modifiers.moves(m) or modifiers.changes_weights(m) for m in shown) or keys_in_use(obj)
+    return shaping or (look == "CURRENT" and bool(armature.rigs(obj)))
+
+
+def keys_in_use(obj: bpy.types.Object) -> bool:
+    """Whether shape keys make another shape than the Basis; a key with a driver may."""
+    keys = obj.data.shape_keys
+    if keys is None:
+        return False
+    others = [key for key in keys.key_blocks if key != keys.reference_key and not key.mute]
+    driven = bool(keys.animation_data and keys.animation_data.drivers)
+    pinned = obj.show_only_shape_key and obj.active_shape_key != keys.reference_key
+    return pinned or not keys.use_relative or bool(others and driven) or any(key.value != 0 for key in others)
+
+
+def _kept_positions(obj: bpy.types.Object, look: Look) -> tuple[NDArray[np.float32], list[str]]:
+    """(V, 3) local positions, and the modifiers that shape but had to be left out.
+
+    Geometry Nodes are left out only if they change the number of vertices. In rest pose simulations are left out: they
+    would run on from a pose that they have never seen.
+    """
+    off = [m for m in modifiers.shown(obj) if not modifiers.keeps_vertices(m) and m.type != "NODES"]
+    if look == "AS_SHOWN":
+        off += [m for m in modifiers.shown(obj) if m.type in ("CLOTH", "SOFT_BODY")]
+    nodes = [m for m in modifiers.shown(obj) if m.type == "NODES"]
+    local = _positions_without(obj, off)
+    if len(local) != len(obj.data.vertices) and nodes:
+        off += nodes
+        local = _positions_without(obj, off)
+    if len(local) != len(obj.data.vertices):
+        raise SceneError(f"{obj.name} has another number of vertices when evaluated: set Geometry to Rest")
+    return local, [m.name for m in off if modifiers.hides_shape(m) or modifiers.keeps_vertices(m)]
+
+
+def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:
+    try:
+        for modifier in off:
+            modifier.show_viewport = False
+        evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return mesh.positions(evaluated.data)
+    finally:
+        for modifier in off:
+            modifier.show_viewport = True
+
+
+@contextmanager
+def _evaluable(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """The object, or for the moment a stand-in that Blender evaluates although the object is hidden or excluded."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    if obj.evaluated_get(depsgraph).is_evaluated and obj.visible_get():
+        yield obj
+        return
+    scene, stand_in = bpy.context.scene, obj.copy()
+    stand_in.hide_viewport = False
+    scene.collection.objects.link(stand_in)
+    try:
+        bpy.context.view_layer.update()
+        yield stand_in
+    finally:
+        bpy.data.objects.remove(stand_in)

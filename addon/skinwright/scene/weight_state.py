@@ -1,0 +1,150 @@
+"""All weights of an object as they stand, to the bit and in stored order, and what brings them back."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .vertex_groups import Memberships, _by_group, _memberships, activate
+
+
+@dataclass(frozen=True)
+class WeightState:
+    """The groups in their order, and the members of vertex i: entries indptr[i] to indptr[i + 1], in stored order.
+
+    `groups` (nnz,) index `names`; values need not be sound: what is there is kept.
+    """
+
+    names: list[str]
+    locked: list[bool]
+    active: str
+    indptr: NDArray[np.uint32]
+    groups: NDArray[np.uint32]
+    values: NDArray[np.float32]
+
+    def digest(self) -> str:
+        """Equal for equal states only."""
+        found = hashlib.sha256(repr((self.names, self.locked, self.active)).encode())
+        for array in (self.indptr, self.groups, self.values):
+            found.update(np.ascontiguousarray(array).tobytes())
+        return found.hexdigest()
+
+
+def capture(obj: bpy.types.Object) -> WeightState:
+    """The state of an object; not in Edit mode."""
+    n = len(obj.data.vertices)
+    held = _memberships(obj.data, np.arange(n, dtype=np.int64))
+    known = held.group < len(obj.vertex_groups)  # a mesh may hold indices beyond its object's list
+    counts = np.bincount(held.row[known], minlength=n)
+    return WeightState(
+        names=[group.name for group in obj.vertex_groups],
+        locked=[group.lock_weight for group in obj.vertex_groups],
+        active=obj.vertex_groups.active.name if obj.vertex_groups.active else "",
+        indptr=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.uint32),
+        groups=held.group[known].astype(np.uint32),
+        values=held.values[known].copy(),
+    )
+
+
+def apply(obj: bpy.types.Object, state: WeightState) -> None:
+    """Bring a state back to a mesh of as many vertices: groups, their order, locks, members, their order, every bit."""
+    if [group.name for group in obj.vertex_groups] != state.names:
+        obj.vertex_groups.clear()
+        for name in state.names:
+            obj.vertex_groups.new(name=name)
+    for group, lock in zip(obj.vertex_groups, state.locked, strict=True):
+        group.lock_weight = lock
+    _apply_members(obj, state)
+    activate(obj, state.active)
+    obj.data.update()
+
+
+def _apply_members(obj: bpy.types.Object, state: WeightState) -> None:
+    mesh, every = obj.data, np.arange(len(obj.data.vertices), dtype=np.int64)
+    held = _memberships(mesh, every)
+    known = held.group < len(obj.vertex_groups)
+    wrong = _vertices_with_other_members(held.row[known], held.group[known], state)
+    if wrong.any():
+        gone = known & wrong[held.row]
+        for index, members in _by_group(held.row[gone], held.group[gone]):
+            obj.vertex_groups[index].remove(members)
+        _add_in_order(obj, state, wrong)
+        held = _memberships(mesh, every)
+        known = held.group < len(obj.vertex_groups)
+    now = held.values.copy()
+    now[known] = state.values
+    _set_all(mesh, held, now)
+
+
+def _set_all(mesh: bpy.types.Mesh, held: Memberships, values: NDArray[np.float32]) -> None:
+    if held.array is not None:
+        held.array.set_weights(values)
+        return
+    ends = np.cumsum(np.bincount(held.row, minlength=len(mesh.vertices)), dtype=np.int64).tolist()
+    for vertex, start, end in zip(mesh.vertices, [0, *ends], ends, strict=False):
+        vertex.groups.foreach_set("weight", values[start:end])
+
+
+def _vertices_with_other_members(
+    row: NDArray[np.int64], group: NDArray[np.int64], state: WeightState
+) -> NDArray[np.bool_]:
+    """(V,) those whose members or their order differ."""
+    wanted = np.diff(state.indptr).astype(np.int64)
+    now = np.bincount(row, minlength=len(wanted))
+    wrong = wanted != now
+    same = ~wrong
+    mine = group[same[row]]
+    theirs = state.groups[np.repeat(same, wanted)]
+    at = np.repeat(np.flatnonzero(same), wanted[same])
+    wrong[at[mine != theirs]] = True
+    return wrong
+
+
+def _add_in_order(obj: bpy.types.Object, state: WeightState, chosen: NDArray[np.bool_]) -> None:
+    """First members first, as Blender appends each. They come with weight 0, so that no row ever holds too much."""
+    counts = np.diff(state.indptr).astype(np.int64)
+    row = np.repeat(np.arange(len(counts), dtype=np.int64), counts)
+    rank = np.arange(len(row), dtype=np.int64) - np.repeat(state.indptr[:-1].astype(np.int64), counts)
+    entries = np.flatnonzero(chosen[row])
+    for position in range(int(rank[entries].max(initial=-1)) + 1):
+        now = entries[rank[entries] == position]
+        for index, members in _by_group(row[now], state.groups[now].astype(np.int64)):
+            obj.vertex_groups[index].add(members, 0.0, "REPLACE")
+
+
+@dataclass(frozen=True)
+class _Target:
+    """What an operation may change of an object."""
+
+    object: bpy.types.Object
+    mesh: bpy.types.Mesh
+    state: WeightState
+    modifiers: list[str]
+
+
+@contextmanager
+def all_or_nothing(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Whatever exception leaves the block, the weights, meshes and modifiers of `objects` are as they were before."""
+    before = [_Target(o, o.data, capture(o), [m.name for m in o.modifiers]) for o in objects]
+    try:
+        yield
+    except BaseException:
+        for target in before:
+            _bring_back(target)
+        raise
+
+
+def _bring_back(target: _Target) -> None:
+    obj, mesh = target.object, target.mesh
+    for modifier in [m for m in obj.modifiers if m.name not in target.modifiers]:
+        obj.modifiers.remove(modifier)
+    copy = obj.data
+    if copy != mesh:
+        obj.data = mesh
+        if copy.users == 0:
+            bpy.data.meshes.remove(copy)
+    apply(obj, target.state)

@@ -1,0 +1,85 @@
+//! One volume for a whole joint: what sub-steps and membrane have lost is blown up again where nothing touches.
+
+use glam::Vec3;
+
+use super::coupling::{place, shift};
+use super::joints::Member;
+use super::local::Local;
+
+/// Rounds; each moves skin along its normals by what is still missing.
+const ROUNDS: usize = 8;
+/// Passes that fade the weight towards contacts and the ends of the region.
+const FADING: usize = 8;
+/// Farthest that a round moves skin, in radii.
+const STEP: f32 = 0.08;
+
+/// The skin of one joint, its triangles and how much of the motion each vertex takes.
+pub(super) struct Balloon {
+    vertices: Vec<u32>,
+    weights: Vec<f32>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Balloon {
+    /// Over the free skin of `members`; `kept` are vertices that stay, as those in contact do.
+    pub(super) fn new(local: &Local, members: &[Member], kept: &[u32]) -> Self {
+        let mut weight = vec![0.0f32; local.particles.len()];
+        let vertices: Vec<u32> = members.iter().map(|m| m.particle).filter(|&p| local.is_surface(p)).collect();
+        vertices.iter().for_each(|&p| weight[p as usize] = 1.0);
+        let member = |p: u32| weight[p as usize] > 0.0;
+        let triangles = local.triangles.iter().filter(|t| t.iter().any(|&p| member(p))).copied().collect();
+        kept.iter().for_each(|&p| weight[p as usize] = 0.0);
+        for _ in 0..FADING {
+            let faded = |&p: &u32| {
+                let ring = local.ring(p);
+                ring.iter().map(|&n| weight[n as usize]).sum::<f32>() / ring.len().max(1) as f32
+            };
+            let faded: Vec<f32> = vertices.iter().map(faded).collect();
+            vertices.iter().zip(faded).for_each(|(&p, w)| weight[p as usize] = w);
+        }
+        let weights = vertices.iter().map(|&p| weight[p as usize]).collect();
+        Self { vertices, weights, triangles }
+    }
+
+    /// Six times the volume between the skin and `apex`. The ends of the region move rigidly about the joint, so that what
+    /// they and the apex span does not change.
+    pub(super) fn volume(&self, apex: Vec3, at: impl Fn(u32) -> Vec3) -> f64 {
+        let corner = |p: u32| (at(p) - apex).as_dvec3();
+        self.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum()
+    }
+
+    /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round.
+    pub(super) fn inflate(
+        &self,
+        local: &mut Local,
+        apex: Vec3,
+        target: f64,
+        radius: f32,
+        mut limit: impl FnMut(&mut Local),
+    ) {
+        let mut normals = vec![Vec3::ZERO; local.particles.len()];
+        for _ in 0..ROUNDS {
+            let missing = target - self.volume(apex, |p| place(&local.particles[p as usize]));
+            if missing.abs() < 1e-5 * target.abs() {
+                return;
+            }
+            self.vertices.iter().for_each(|&p| normals[p as usize] = Vec3::ZERO);
+            for t in &self.triangles {
+                let [a, b, c] = t.map(|p| place(&local.particles[p as usize]));
+                let doubled = (b - a).cross(c - a);
+                t.iter().for_each(|&p| normals[p as usize] += doubled);
+            }
+            let swept: f64 = self.sum(|p, w| f64::from(w * normals[p as usize].length()));
+            let step = (missing / swept.max(1e-12)) as f32;
+            let step = step.clamp(-STEP * radius, STEP * radius);
+            for (&p, &w) in self.vertices.iter().zip(&self.weights) {
+                shift(&mut local.particles[p as usize], normals[p as usize].normalize_or_zero() * (w * step));
+            }
+            limit(local);
+        }
+    }
+
+    fn sum(&self, term: impl Fn(u32, f32) -> f64) -> f64 {
+        self.vertices.iter().zip(&self.weights).map(|(&p, &w)| term(p, w)).sum()
+    }
+}

@@ -1,0 +1,27 @@
+//! Skin of two bones meets in the plane between them.
+
+use glam::Vec3;
+
+/// The plane that halves the angle between two bones, through their joint.
+#[derive(Debug, Clone, Copy)]
+pub struct HalfSpace {
+    /// A point of the plane.
+    pub origin: Vec3,
+    /// Unit normal, towards the child's bone.
+    pub normal: Vec3,
+    /// Distance to keep from the plane.
+    pub gap: f32,
+}
+
+impl HalfSpace {
+    /// How far inside of its half `point` lies, negative beyond the plane; `side` is +1 for the child's, -1 for the parent's.
+    pub fn depth(&self, point: Vec3, side: f32) -> f32 {
+        (point - self.origin).dot(self.normal) * side - self.gap
+    }
+}
+
+/// The move that brings `point` back to its own half, if it is not there.
+pub fn self_collision(plane: &HalfSpace, point: Vec3, side: f32) -> Vec3 {
+    let depth = plane.depth(point, side);
+    if depth < 0.0 { plane.normal * (-depth * side) } else { Vec3::ZERO }
+}

@@ -1,0 +1,77 @@
+//! What a pose asks of each joint: which are active, how far they reach, where their planes are at each step.
+
+use glam::{DAffine3, Vec3};
+
+use super::constraint::{Axis, HalfSpace};
+use super::joints::{Joint, Member};
+use super::skeleton::{Path, rotation_of};
+
+/// Joints that turn less than this stay as skinning leaves them.
+const LEAST_ANGLE: f64 = 5.0;
+/// Beyond this bend a limb's sides meet along all of it; the reach grows no further.
+const MOST_BEND: f32 = 2.5;
+/// What a joint's region reaches beyond the crease, in radii.
+const MARGIN: f32 = 0.8;
+/// Gap on each side of the plane, in radii, for a joint that has turned by a right angle or more.
+const GAP: f32 = 0.016;
+
+/// A joint that turns in this frame.
+#[derive(Debug)]
+pub(super) struct ActiveJoint<'a> {
+    pub(super) joint: &'a Joint,
+    /// How far along the bones its particles move freely.
+    pub(super) reach: f32,
+    /// The angle by which it swings, radians.
+    pub(super) swing: f32,
+}
+
+/// The joints that turn, in order of bones.
+pub(super) fn active_joints<'a>(joints: &'a [Joint], path: &Path<'_>, pose: &[DAffine3]) -> Vec<ActiveJoint<'a>> {
+    let turns = |joint: &&Joint| path.angle(joint.bone) > LEAST_ANGLE.to_radians();
+    let active = |joint: &'a Joint| {
+        let [up, down] = posed_axis(joint, pose).directions;
+        let bend = (-up).angle_between(down).min(MOST_BEND);
+        let twist = (path.angle(joint.bone) - path.swing_angle(joint.bone)).max(0.0) as f32;
+        let reach = joint.radius * ((bend / 2.0).tan() + MARGIN + twist / std::f32::consts::PI);
+        ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32 }
+    };
+    joints.iter().filter(turns).map(active).collect()
+}
+
+/// The joint's bones in a pose.
+pub(super) fn posed_axis(joint: &Joint, pose: &[DAffine3]) -> Axis {
+    let origin = pose[joint.parent].transform_point3(joint.axis.origin.as_dvec3());
+    let [up, down] = joint.axis.directions;
+    let turned = |bone: usize, direction: Vec3| {
+        (rotation_of(&pose[bone].matrix3) * direction.as_dvec3()).as_vec3().normalize_or_zero()
+    };
+    Axis { origin: origin.as_vec3(), directions: [turned(joint.parent, up), turned(joint.bone, down)] }
+}
+
+impl ActiveJoint<'_> {
+    /// The plane between the bones, when the joint has swung by `share` of its way. None for what is no limb.
+    pub(super) fn plane(&self, axis: &Axis, share: f32) -> Option<HalfSpace> {
+        let [up, down] = axis.directions;
+        let normal = (down - up).try_normalize()?;
+        let gap = GAP * self.joint.radius * (self.swing * share / std::f32::consts::FRAC_PI_2).min(1.0);
+        let bends = self.swing > LEAST_ANGLE.to_radians() as f32;
+        (self.joint.is_limb && bends).then_some(HalfSpace { origin: axis.origin, normal, gap })
+    }
+
+    /// The particles that move freely.
+    pub(super) fn free(&self) -> impl Iterator<Item = &Member> {
+        self.joint.members.iter().filter(|member| member.along < self.reach)
+    }
+
+    /// The particles beyond, for as far again.
+    pub(super) fn beyond(&self) -> impl Iterator<Item = &Member> {
+        self.joint.members.iter().filter(|member| (self.reach..2.0 * self.reach).contains(&member.along))
+    }
+
+    /// Nearest and farthest that a particle beyond the free ones may be from the bones: what skinning says matters more
+    /// the farther it is.
+    pub(super) fn bounds_beyond(&self, member: &Member) -> (f32, f32) {
+        let away = (member.along / self.reach - 1.0).clamp(0.0, 1.0);
+        (member.distance * (0.98 - 0.98 * away), member.distance * (1.02 + away))
+    }
+}

@@ -1,0 +1,165 @@
+//! `Refiner`: a character prepared for refinement by position-based dynamics.
+
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use skinwright_core::refine as core;
+use skinwright_core::{Progress, TriMesh};
+
+use crate::arrays::{Matrix, Vector, entries, triples};
+use crate::error::{InvalidParameter, enter, to_python};
+use crate::ranges;
+use crate::skinning::{Stack, pose, vectors};
+use crate::weights::Weights;
+
+/// A character prepared once (lattice, embedding, joints) for any number of poses.
+#[pyclass(frozen, module = "skinwright_native")]
+pub struct Refiner {
+    core: core::Refiner,
+    /// Triangles of the mesh, and the pairs of them that intersect at rest.
+    triangles: Vec<[u32; 3]>,
+    rest_pairs: usize,
+    pool: Option<ThreadPool>,
+    report: Mutex<Option<Solved>>,
+}
+
+/// The last pose solved: figures, and positions for counting pairs when somebody asks.
+struct Solved {
+    report: core::Report,
+    skinned: Vec<[f32; 3]>,
+    refined: Vec<[f32; 3]>,
+}
+
+#[pymethods]
+impl Refiner {
+    #[new]
+    #[pyo3(signature = (rest_positions, triangles, weights, bone_parents, bone_segments, *, cell=None, stretch=1.0,
+                        volume=1.0, bind=1.08, energy=0.1, self_collision=true, threads=0))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        rest_positions: Matrix<'_, f32>,
+        triangles: Matrix<'_, u32>,
+        weights: &Weights,
+        bone_parents: Vector<'_, i32>,
+        bone_segments: Stack<'_, f64>,
+        cell: Option<f64>,
+        stretch: f64,
+        volume: f64,
+        bind: f64,
+        energy: f64,
+        self_collision: bool,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
+    ) -> PyResult<Self> {
+        let (positions, triangles) = (triples(&rest_positions, "rest_positions")?, triples(&triangles, "triangles")?);
+        let (weights, parents) = (weights.to_core(py)?, entries(&bone_parents));
+        let segments = segments(&bone_segments)?;
+        let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };
+        let build = || {
+            let mesh = TriMesh::new(&positions, &triangles, "character")?;
+            let refiner = core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())?;
+            let pairs = core::intersecting_pairs(&positions, &triangles).len();
+            Ok((refiner, pairs))
+        };
+        let (core, rest_pairs) = enter(py, threads, build)?;
+        let pool = (threads > 0)
+            .then(|| ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"));
+        Ok(Self { core, triangles, rest_pairs, pool, report: Mutex::new(None) })
+    }
+
+    /// Refined positions (V, 3) of a pose (B, 4, 4); `quality` "live" takes few steps, "bake" more.
+    #[pyo3(signature = (pose_from_rest, *, quality="live"))]
+    fn solve<'py>(
+        &self,
+        py: Python<'py>,
+        pose_from_rest: Stack<'py, f64>,
+        quality: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let pose = pose(&pose_from_rest)?;
+        let Some(quality) = core::Quality::ALL.into_iter().find(|q| q.name() == quality) else {
+            return Err(InvalidParameter::new_err(format!("quality is {quality:?}, but must be \"live\" or \"bake\"")));
+        };
+        let solve = || self.core.solve(&pose, quality);
+        let solved = match &self.pool {
+            // The pool is kept: starting threads takes longer than a frame's stage.
+            Some(pool) => enter(py, 0, || pool.install(solve))?,
+            None => enter(py, 0, solve)?,
+        };
+        let skinned = self.core.skinned(&pose).map_err(to_python)?;
+        let (refined, report) = solved;
+        let solved = Solved { report, skinned, refined: refined.clone() };
+        *self.report.lock().unwrap_or_else(PoisonError::into_inner) = Some(solved);
+        vectors(py, refined)
+    }
+
+    /// Figures of the pose solved last; pairs of intersecting triangles are counted here. None before the first.
+    fn report(&self, py: Python<'_>) -> PyResult<Option<Py<PyDict>>> {
+        let guard = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(solved) = guard.as_ref() else { return Ok(None) };
+        let count = |positions: &[[f32; 3]]| core::intersecting_pairs(positions, &self.triangles).len();
+        let (before, after) = enter(py, 0, || Ok((count(&solved.skinned), count(&solved.refined))))?;
+        let report = figures(py, &solved.report)?;
+        report.set_item("pairs_at_rest", self.rest_pairs)?;
+        report.set_item("pairs_before", before)?;
+        report.set_item("pairs_after", after)?;
+        Ok(Some(report.unbind()))
+    }
+}
+
+fn segments(array: &Stack<'_, f64>) -> PyResult<Vec<[[f64; 3]; 2]>> {
+    let &[_, 2, 3] = array.shape() else {
+        let shape = array.shape();
+        return Err(InvalidParameter::new_err(format!("bone_segments must have shape (B, 2, 3), not {shape:?}")));
+    };
+    let end = |m: &numpy::ndarray::ArrayView2<'_, f64>, r: usize| std::array::from_fn(|c| m[[r, c]]);
+    Ok(array.as_array().outer_iter().map(|m| [end(&m, 0), end(&m, 1)]).collect())
+}
+
+fn figures<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'py, PyDict>> {
+    let figures = PyDict::new(py);
+    let joint = |joint: &core::JointReport| {
+        let figures = PyDict::new(py);
+        figures.set_item("bone", joint.bone)?;
+        figures.set_item("angle", joint.angle)?;
+        figures.set_item("volume_before", joint.volume_before)?;
+        figures.set_item("volume_after", joint.volume_after)?;
+        figures.set_item("bulge_before", joint.bulge_before)?;
+        figures.set_item("bulge_after", joint.bulge_after)?;
+        figures.set_item("is_limb", joint.is_limb)?;
+        Ok(figures)
+    };
+    figures.set_item("joints", report.joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?)?;
+    figures.set_item("active_tetrahedra", report.active_tetrahedra)?;
+    figures.set_item("inverted_tetrahedra", report.inverted_tetrahedra)?;
+    figures.set_item("tetrahedra", report.tetrahedra)?;
+    figures.set_item("cloned_tetrahedra", report.cloned_tetrahedra)?;
+    figures.set_item("nodes", report.nodes)?;
+    figures.set_item("constraints", report.constraints)?;
+    figures.set_item("iterations", report.iterations)?;
+    let stages = PyDict::new(py);
+    report.stages.iter().try_for_each(|(name, ms)| stages.set_item(name, ms))?;
+    figures.set_item("milliseconds", stages)?;
+    Ok(figures)
+}
+
+/// Pairs (P, 2) of triangles that pass through each other and share no vertex, ascending.
+#[pyfunction]
+#[pyo3(signature = (positions, triangles, *, threads=0))]
+pub fn intersecting_pairs<'py>(
+    py: Python<'py>,
+    positions: Matrix<'py, f32>,
+    triangles: Matrix<'py, u32>,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
+    let find = || {
+        TriMesh::new(&positions, &triangles, "character")?;
+        Ok(core::intersecting_pairs(&positions, &triangles))
+    };
+    let pairs = enter(py, threads, find)?;
+    let shape = [pairs.len(), 2];
+    PyArray1::from_vec(py, pairs.into_flattened()).reshape(shape)
+}
