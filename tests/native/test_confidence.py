@@ -233,7 +233,7 @@ def test_small_loose_parts_become_rigid(method):
     source, _ = tubes()
     prepared = native_source(*source)
     loose, on_skin = small_part(source, 0.02), small_part(source, 0.0)
-    settings = {"method": method, "relative_max_distance": 1.0, "max_normal_angle": 3.2}
+    settings = {"method": method, "relative_max_distance": 1.0, "max_normal_angle": 3.14}
     rows = lambda part, choice: dense(prepared.transfer(*part, small_islands=choice, **settings))  # noqa: E731
     assert np.ptp(rows(loose, "rigid"), axis=0).max() < 1e-6
     assert np.ptp(rows(loose, "solved"), axis=0).max() > 0.01

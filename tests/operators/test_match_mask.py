@@ -72,17 +72,17 @@ def test_the_mask_decides(coat, session):
 def test_confidence_is_graded_and_coloured(coat, session):
     transfer = bpy.context.scene.skinwright.transfer
     assert session.match(params()).confidence is None
-    transfer.method = "confidence"
+    transfer.method = "CONFIDENCE"
     match = session.match(params())
-    z = session.garment.geometry.positions[:, 2]
-    sheet = z < 0.6
-    assert (match.confidence[z < 0.1] > 0.9).all()
-    assert (match.confidence[sheet & (z > 0.1)] < match.confidence[z < 0.1].min()).all()
-    assert (match.confidence[~sheet] == 0).all(), "the patch hangs on the sheet"
+    x, _, z = session.garment.geometry.positions.T
+    flat, far, patch = x < -0.1, (z > 0.1) & (z < 0.6), z > 0.6
+    assert (match.confidence[flat & ~patch] > 0.9).all()
+    assert (match.confidence[far] < 0.1).all()
+    assert (match.confidence[patch] == 0).all(), "the patch hangs on the sheet"
     before = match.confidence
     transfer.softness = 1.4
     softer = session.match(params()).confidence
-    assert (softer[sheet & (z > 0.1)] < before[sheet & (z > 0.1)]).all()
+    assert (softer[far] < before[far]).all()
 
     picture = import_module(f"{PACKAGE}.overlay.picture")
     colours = import_module(f"{PACKAGE}.overlay.colours")
@@ -91,12 +91,12 @@ def test_confidence_is_graded_and_coloured(coat, session):
     assert shown.kind == "CONFIDENCE"
     assert [value for value, _ in shown.rows] == [1, 0.5, 0, 2, 3, 4]
     rgb = colours.of_values(shown.kind, shown.values)
-    np.testing.assert_allclose(rgb[~sheet], colours.CATEGORIES[[4] * 3])
+    np.testing.assert_allclose(rgb[patch], colours.CATEGORIES[[4] * 3])
     np.testing.assert_allclose(colours.of_values("CONFIDENCE", np.array([0.0, 1.0])), colours.CATEGORIES[[1, 0]])
 
 
 def test_the_mask_decides_with_confidence_too(coat, session):
-    bpy.context.scene.skinwright.transfer.method = "confidence"
+    bpy.context.scene.skinwright.transfer.method = "CONFIDENCE"
     coat.skinwright.mask_group = "Match Mask"
     builders.paint(coat, **{"Match Mask": [0.0] * 9 + [0.5] * 72 + [1.0] * 3})
     session.read_mask(coat)

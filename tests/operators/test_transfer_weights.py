@@ -58,14 +58,14 @@ def test_confidence_is_the_native_functions(native, body, coat):
     coat.rotation_euler.x = radians(5)
     coat.location.z = 0.1
     bpy.context.view_layer.update()
-    run(method="confidence", softness=1.2)
+    run(method="CONFIDENCE", softness=1.2)
     expected = native_answer(native, body, coat, method="confidence", softness=1.2)
     np.testing.assert_allclose(builders.dense(coat, BONES), expected, atol=1e-6)
     other = native_answer(native, body, coat)
     assert np.abs(expected - other).max() > 1e-3
 
 
-@pytest.mark.parametrize("method", ["paper", "confidence"])
+@pytest.mark.parametrize("method", ["PAPER", "CONFIDENCE"])
 def test_locks_and_mask_hold_with_every_method(body, coat, method):
     builders.paint(coat, **{"Arm.L": [0.25] * 81, "Match Mask": [0.0] * 40 + [1.0] * 41})
     coat.vertex_groups["Arm.L"].lock_weight = True

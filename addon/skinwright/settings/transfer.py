@@ -35,7 +35,7 @@ class TransferSettings:
         layout.prop(self, "geometry")
         layout.prop(self, "join_borders")
         layout.prop(self, "method")
-        if self.method == "confidence":
+        if self.method == "CONFIDENCE":
             layout.prop(self, "softness")
             return
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
