@@ -205,3 +205,7 @@ refine-eval: .venv/bench.stamp
 .PHONY: retarget-eval
 retarget-eval: .venv/bench.stamp $(BODY)
 	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out
+## make quality-eval  transferred weights against those that artists painted: bench/quality_results.md and .png
+.PHONY: quality-eval
+quality-eval: .venv/bench.stamp
+	.venv/bin/python bench/quality_eval.py

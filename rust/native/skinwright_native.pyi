@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
+MatchMethod = Literal["paper", "confidence"]
+SmallIslands = Literal["auto", "rigid", "solved"]
 
 def version() -> str: ...
 def set_memory_budget(bytes: int | None) -> None:
@@ -51,6 +53,10 @@ class Transfer:
     @property
     def matched(self) -> NDArray[np.bool_]: ...
     @property
+    def confidence(self) -> NDArray[np.float32]:
+        """How far the row from the source was trusted, 0 to 1; `matched` are those at 0.5 or more."""
+
+    @property
     def distance(self) -> NDArray[np.float32]: ...
     @property
     def angle(self) -> NDArray[np.float32]: ...
@@ -62,6 +68,10 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
+    `method`: "paper" copies the closest point's weights where distance and angle are within their thresholds and
+    ignores them elsewhere; "confidence" takes the point nearest in position and direction and trusts it over
+    `softness` times its gap: there the thresholds tell only which islands have a match at all, and the smoothness
+    length how masked vertices are filled in.
     `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if
     that is larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
@@ -69,9 +79,12 @@ class TransferSettings(TypedDict, total=False):
     that close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
-    `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
+    `island_policy`: what islands without any match get; rows that "skip" leaves are empty. `small_islands`: "rigid"
+    gives each small, loose, nearly rigid island one row; "auto" does so with "confidence".
     """
 
+    method: MatchMethod
+    softness: float
     max_distance: float | None
     relative_max_distance: float
     max_normal_angle: float
@@ -84,6 +97,7 @@ class TransferSettings(TypedDict, total=False):
     smoothing_factor: float
     max_influences: int
     island_policy: IslandPolicy
+    small_islands: SmallIslands
 
 @final
 class Source:
@@ -126,6 +140,7 @@ class Inpainting:
     def islands(self) -> NDArray[np.uint32]: ...
     def set_source_weights(self, weights: Weights) -> None: ...
     def matched(self, **settings: Unpack[TransferSettings]) -> NDArray[np.bool_]: ...
+    def confidence(self, **settings: Unpack[TransferSettings]) -> NDArray[np.float32]: ...
     def solve(self, **settings: Unpack[TransferSettings]) -> Transfer: ...
     def start(self, **settings: Unpack[TransferSettings]) -> Job: ...
     def raw_weights(self, **settings: Unpack[TransferSettings]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
@@ -150,6 +165,8 @@ def transfer_weights(
     target_triangles: ArrayLike,
     *,
     target_edges: ArrayLike | None = None,
+    method: MatchMethod = "paper",
+    softness: float = 0.7,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
@@ -162,6 +179,7 @@ def transfer_weights(
     smoothing_factor: float = 0.2,
     max_influences: int = 0,
     island_policy: IslandPolicy = "bridge",
+    small_islands: SmallIslands = "auto",
     threads: int = 0,
 ) -> Transfer: ...
 def fill(

@@ -99,6 +99,11 @@ class Inpainting:
         with _naming(self.name):
             return self._inpainting.matched(**thresholds)
 
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.confidence(**thresholds)
+
     def start(self, **params: Any) -> "Job":
         """Solve on threads of Rust's own."""
         with _naming(self.name):
@@ -146,7 +151,7 @@ def start_embedding(
 ) -> EmbeddingJob:
     """A skeleton into a mesh, on threads of Rust's own; keyword arguments as in the stub.
 
-    `mesh` is positions and triangles, `bones` are heads, tails and parents, `donor` is empty or positions, triangles and
+    `mesh` is positions and triangles; `bones` are heads, tails, parents; `donor` is empty or positions, triangles and
     rows of the character that the bones were made for.
     """
     keywords = dict(options)
