@@ -196,3 +196,8 @@ autoskin-eval: .venv/bench.stamp $(BODY)
 .PHONY: embed-eval
 embed-eval: .venv/bench.stamp $(BODY)
 	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)
+
+## make refine-eval  refined skin against Blender's own skinning on cylinder, joints and characters: bench/refine_results.md
+.PHONY: refine-eval
+refine-eval: .venv/bench.stamp
+	.venv/bin/python bench/refine_eval.py
