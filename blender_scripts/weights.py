@@ -3,7 +3,7 @@
     blender -b file.blend -P blender_scripts/weights.py -- export --object Body --file body.npz
     python blender_scripts/weights.py import file.blend --object Body --file body.npz --save out.blend
 
-docs/weights_format.md describes the files. Exit codes: 0 done, 1 failed, 2 usage.
+docs/pages/stored.md describes the files. Exit codes: 0 done, 1 failed, 2 usage.
 """
 
 import sys

@@ -18,6 +18,7 @@ def params_classes(addon):
         addon.transfer.TransferParams,
         addon.transfer.Mask,
         addon.sculpt.params.SculptParams,
+        addon.autoskin.AutoskinParams,
         addon.desparsify.DesparsifyParams,
         addon.check.params.CheckParams,
         addon.preferences.Preferences,
@@ -85,6 +86,7 @@ def test_properties_are_made_from_the_declarations(addon, scene):
     homes = [
         (addon.transfer.TransferParams, scene.skinwright.transfer.bl_rna.properties),
         (addon.transfer.TransferParams, operators.transfer_weights.get_rna_type().properties),
+        (addon.autoskin.AutoskinParams, operators.automatic_weights.get_rna_type().properties),
         (addon.desparsify.DesparsifyParams, operators.desparsify.get_rna_type().properties),
         (addon.check.params.CheckParams, operators.check_weights.get_rna_type().properties),
         (addon.sculpt.params.SculptParams, scene.skinwright.sculpt.bl_rna.properties),
@@ -123,7 +125,11 @@ def test_defaults_are_the_librarys(addon, native):
     from pathlib import Path
 
     stub = dict(stub_defaults(Path(__file__).parents[1] / "rust" / "native" / "skinwright_native.pyi"))
-    calls = [("transfer_weights", addon.transfer.TransferParams()), ("desparsify", addon.desparsify.DesparsifyParams())]
+    calls = [
+        ("transfer_weights", addon.transfer.TransferParams()),
+        ("automatic_weights", addon.autoskin.AutoskinParams()),
+        ("desparsify", addon.desparsify.DesparsifyParams()),
+    ]
     for name, params in calls:
         signature = inspect.signature(getattr(native, name)).parameters
         library = {key: p.default for key, p in signature.items() if p.default is not inspect.Parameter.empty}
@@ -133,3 +139,28 @@ def test_defaults_are_the_librarys(addon, native):
     solver = inspect.signature(native.SculptSolver).parameters
     for key, value in addon.declared.native_keywords(addon.sculpt.params.SculptParams()).items():
         assert solver[key].default == value
+
+
+def test_choices_are_the_librarys_methods(addon, native):
+    """Each list of methods is ALL of its enum in core, which the library names when it refuses another."""
+    import re
+    from pathlib import Path
+
+    weights = native.Weights.from_dense([[1.0]])
+    sheet = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    rows = native.Weights.from_dense([[1.0]] * 3)
+    calls = {
+        ("transfer", "TransferParams", "island_policy"): lambda: native.transfer_weights(
+            *sheet, rows, *sheet, island_policy="none"
+        ),
+        ("desparsify", "DesparsifyParams", "method"): lambda: native.desparsify(weights, [-1], method="none"),
+    }
+    stub = (Path(__file__).parents[1] / "rust" / "native" / "skinwright_native.pyi").read_text()
+    for (feature, kind, name), call in calls.items():
+        with pytest.raises(native.InvalidParameter, match="must be one of") as refused:
+            call()
+        library = set(re.split(r", ", str(refused.value).rpartition("must be one of ")[2]))
+        _, one = addon.declared.declared(getattr(getattr(addon, feature), kind))[name]
+        assert set(one.choices) == library, name
+        literals = [set(re.findall(r'"(\w+)"', group)) for group in re.findall(r"Literal\[([^]]*)\]", stub)]
+        assert library in literals, f"the stub lacks {library}"

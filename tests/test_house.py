@@ -19,11 +19,13 @@ FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "s
 FEATURES = {
     "transfer": set(),
     "match": {"transfer"},
+    "autoskin": set(),
     "desparsify": set(),
     "sculpt": {"desparsify"},
     "stored": {"transfer"},
     "check": set(),
     "retarget": {"transfer"},
+    "embed": {"retarget"},
     "refine": set(),
     "wardrobe": {"transfer"},
 }

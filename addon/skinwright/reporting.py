@@ -45,6 +45,7 @@ class Report:
         names = ", ".join(garment.target for garment in self.garments)
         counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
         counts.append(f"{self._sum('inpainted')} inpainted")
+        counts += self._distance()
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
@@ -58,6 +59,11 @@ class Report:
         groups = f"{self._sum('groups')} groups written, {created} of them new"
         compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
         return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
+
+    def _distance(self) -> list[str]:
+        """The distance in force, if it is one for all."""
+        distances = {f"{g.native['max_distance']:.3g}" for g in self.garments if "max_distance" in g.native}
+        return [f"distance {distances.pop()}"] if len(distances) == 1 else []
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)
@@ -96,6 +102,28 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@dataclass(frozen=True)
+class AutoskinReport:
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
+
+    target: str
+    armature: str
+    vertices: int
+    bones: int
+    outside: list[str]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return f"{self.target}: {self.vertices} vertices have weights for {self.bones} bones of {self.armature}"
+
+    def warnings(self) -> list[str]:
+        """What is worth a look."""
+        if not self.outside:
+            return []
+        named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
+        return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
+MatchMethod = Literal["paper", "confidence"]
+SmallIslands = Literal["auto", "rigid", "solved"]
 
 def version() -> str: ...
 def set_memory_budget(bytes: int | None) -> None:
@@ -51,6 +53,10 @@ class Transfer:
     @property
     def matched(self) -> NDArray[np.bool_]: ...
     @property
+    def confidence(self) -> NDArray[np.float32]:
+        """How far the row from the source was trusted, 0 to 1; `matched` are those at 0.5 or more."""
+
+    @property
     def distance(self) -> NDArray[np.float32]: ...
     @property
     def angle(self) -> NDArray[np.float32]: ...
@@ -62,25 +68,36 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal: largest distance of a match.
+    `method`: "paper" copies the closest point's weights where distance and angle are within their thresholds and
+    ignores them elsewhere; "confidence" takes the point nearest in position and direction and trusts it over
+    `softness` times its gap: there the thresholds tell only which islands have a match at all, and the smoothness
+    length how masked vertices are filled in.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if
+    that is larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices
+    that close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
-    `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
+    `island_policy`: what islands without any match get; rows that "skip" leaves are empty. `small_islands`: "rigid"
+    gives each small, loose, nearly rigid island one row; "auto" does so with "confidence".
     """
 
+    method: MatchMethod
+    softness: float
     max_distance: float | None
     relative_max_distance: float
     max_normal_angle: float
     match_flipped_normals: bool
     mask: ArrayLike | None
+    relative_weld_tolerance: float
     smoothness_length: float | None
     relative_smoothness_length: float
     smoothing_iterations: int
     smoothing_factor: float
     max_influences: int
     island_policy: IslandPolicy
+    small_islands: SmallIslands
 
 @final
 class Source:
@@ -95,6 +112,7 @@ class Source:
         target_positions: ArrayLike,
         target_triangles: ArrayLike,
         *,
+        target_edges: ArrayLike | None = None,
         threads: int = 0,
         **settings: Unpack[TransferSettings],
     ) -> Transfer: ...
@@ -105,7 +123,14 @@ class Inpainting:
     system is factored again only when its own unknowns or the smoothness length change."""
 
     def __new__(
-        cls, source: Source, target_positions: ArrayLike, target_triangles: ArrayLike, *, threads: int = 0
+        cls,
+        source: Source,
+        target_positions: ArrayLike,
+        target_triangles: ArrayLike,
+        *,
+        target_edges: ArrayLike | None = None,
+        threads: int = 0,
+        **settings: Unpack[TransferSettings],
     ) -> Inpainting: ...
     @property
     def distance(self) -> NDArray[np.float32]: ...
@@ -115,6 +140,7 @@ class Inpainting:
     def islands(self) -> NDArray[np.uint32]: ...
     def set_source_weights(self, weights: Weights) -> None: ...
     def matched(self, **settings: Unpack[TransferSettings]) -> NDArray[np.bool_]: ...
+    def confidence(self, **settings: Unpack[TransferSettings]) -> NDArray[np.float32]: ...
     def solve(self, **settings: Unpack[TransferSettings]) -> Transfer: ...
     def start(self, **settings: Unpack[TransferSettings]) -> Job: ...
     def raw_weights(self, **settings: Unpack[TransferSettings]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
@@ -138,17 +164,22 @@ def transfer_weights(
     target_positions: ArrayLike,
     target_triangles: ArrayLike,
     *,
+    target_edges: ArrayLike | None = None,
+    method: MatchMethod = "paper",
+    softness: float = 0.7,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
     mask: ArrayLike | None = None,
+    relative_weld_tolerance: float = 1e-06,
     smoothness_length: float | None = None,
     relative_smoothness_length: float = 0.05,
     smoothing_iterations: int = 0,
     smoothing_factor: float = 0.2,
     max_influences: int = 0,
     island_policy: IslandPolicy = "bridge",
+    small_islands: SmallIslands = "auto",
     threads: int = 0,
 ) -> Transfer: ...
 def fill(
@@ -168,6 +199,61 @@ def fill(
     `positions` (V, 3), `triangles` (T, 3); `kinds` (V,): 0 free, 1 fixed, 2 soft; `rows` (V, C): the known values;
     `confidence` (V,): b of soft vertices, mass included; `length`: world units, 0 for the harmonic solution;
     `weld` (V,): for each vertex one that it is one with, or itself: the system is solved on the welded mesh.
+    """
+
+Quality = Literal["live", "bake"]
+
+@final
+class Refiner:
+    """A character prepared once (lattice, embedding, joints) for any number of poses, in any order.
+
+    `rest_positions` (V, 3) and `bone_segments` (B, 2, 3), head and tail, are at rest in the mesh's own space;
+    `bone_parents` (B,) is negative for a root. `cell` is the edge of a lattice cell in mesh units (None: 1.5 % of the
+    bounding box's diagonal). Each constraint is switched off with 0 or False: `stretch` and `energy` are stiffnesses,
+    `volume` from 0 to 1 (exact), `bind` the farthest that skin may come from its bone as a multiple of rest.
+    """
+
+    def __new__(
+        cls,
+        rest_positions: ArrayLike,
+        triangles: ArrayLike,
+        weights: Weights,
+        bone_parents: ArrayLike,
+        bone_segments: ArrayLike,
+        *,
+        cell: float | None = None,
+        stretch: float = 1.0,
+        volume: float = 1.0,
+        bind: float = 1.08,
+        energy: float = 0.1,
+        self_collision: bool = True,
+        threads: int = 0,
+    ) -> Refiner: ...
+    def solve(self, pose_from_rest: ArrayLike, *, quality: Quality = "live") -> NDArray[np.float32]:
+        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than
+        "bake"."""
+
+    def measure(self, pose_from_rest: ArrayLike, positions: ArrayLike) -> dict[str, Any]:
+        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that
+        turns its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
+
+    def report(self) -> dict[str, Any] | None:
+        """Figures of the pose solved last, which is solved once more for them; None before the first."""
+
+def intersecting_pairs(positions: ArrayLike, triangles: ArrayLike, *, threads: int = 0) -> NDArray[np.uint32]:
+    """Pairs (P, 2) of triangles that pass through each other and share no vertex, ascending."""
+
+def dual_quaternion_blend(
+    rest_positions: ArrayLike,
+    weights: Weights,
+    pose_from_rest: ArrayLike,
+    *,
+    rest_bones: ArrayLike | None = None,
+    threads: int = 0,
+) -> NDArray[np.float32]:
+    """Dual quaternion skinning exactly as Blender's Armature modifier does it with Preserve Volume: (V, 3).
+
+    `rest_bones` (B, 4, 4), the bones' rest matrices, matter only where bones scale.
     """
 
 def linear_blend(
@@ -326,8 +412,8 @@ def biharmonic_embedding(
     """Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance (Lipman et al. 2010,
     doi:10.1145/1805964.1805971), from the smallest non-zero eigenpairs of the cotangent Laplacian: phi_k / lambda_k.
 
-    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too small
-    for are zero, and so are the rows of vertices without a triangle.
+    Each island has a spectrum of its own, so distances between islands mean nothing. Columns that an island is too
+    small for are zero, and so are the rows of vertices without a triangle.
     """
 
 @final
@@ -382,10 +468,10 @@ def retarget_weights(
 ) -> Retarget:
     """Weights of one character for another with a matching skeleton.
 
-    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may stand,
-    face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's, negative for
-    none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor, by
-    `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
+    Frames (B, 4, 4) are rest matrices with the bone along +Y, lengths (B,) in the same units; the two characters may
+    stand, face and be scaled as they like. `bone_map` (B_target,) is the source's bone for each of the target's,
+    negative for none. A weighted bone of the source without a partner gives its share to its nearest mapped ancestor,
+    by `source_parents` (B_source,), or else to the nearest mapped bone; one with several partners divides it by their
     distance.
 
     "skeleton" brings the target into the source's pose and proportions bone by bone and matches by position and normal;
@@ -425,6 +511,7 @@ def start_retarget_weights(
     smoothing_factor: float = 0.2,
 ) -> Job:
     """Starts `retarget_weights` on threads of its own; `Job.result` returns a `Retarget`."""
+
 @final
 class AutoWeights:
     """Automatic weights: one row per vertex, none empty, each summing to 1."""
@@ -433,9 +520,9 @@ class AutoWeights:
     def weights(self) -> Weights: ...
     @property
     def report(self) -> dict[str, Any]:
-        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside` (bones no
-        part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice, `residual`,
-        `seconds` by stage."""
+        """`vertices`, `distinct` (at different positions), `unweighted` (always 0), `bones_used`, `bones_outside`
+        (bones no part of which is inside of the mesh), `most_influences`, `cells` and `cell_size` of the lattice,
+        `residual`, `seconds` by stage."""
 
 def automatic_weights(
     positions: ArrayLike,
@@ -453,10 +540,10 @@ def automatic_weights(
     overlapping, of many islands, split at seams (coincident vertices get equal rows).
 
     `positions` (V, 3) and `triangles` (T, 3) at rest, `bone_segments` (B, 2, 3) head and tail in the same space,
-    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse distances
-    to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit. `resolution`: cells
-    along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat keeps to its bone.
-    """
+    `bone_parents` (B,) int, negative for a root. "heat" is the one to use; "geodesic" and "euclidean" are inverse
+    distances to the nearest bones, through the inside of the mesh and straight. `max_influences` 0: no limit.
+    `resolution`: cells along the mesh's diameter, through which distances are measured. `stiffness`: how closely heat
+    keeps to its bone."""
 
 def start_automatic_weights(
     positions: ArrayLike,
@@ -490,8 +577,8 @@ class Embedding:
 
     @property
     def report(self) -> dict[str, Any]:
-        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones whose heads
-        are outside of the mesh), `penalty`, `seconds`."""
+        """`places` the joints were chosen from, `main_joints` placed by themselves, `symmetric`, `outside` (bones
+        whose heads are outside of the mesh), `penalty`, `seconds`."""
 
 def embed_skeleton(
     positions: ArrayLike,
@@ -500,14 +587,23 @@ def embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Embedding:
     """Puts the bones of a template into a mesh that has none.
 
-    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int, negative
-    for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it is. "medial"
-    needs the shape of the mesh only.
+    `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int,
+    negative for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it
+    is. "medial" needs the shape of the mesh only. "template" needs the character that the bones were made for:
+    `donor_positions` (D, 3), `donor_triangles`, and `donor_weights` over the bones. Its surface is drawn onto the mesh,
+    and each joint goes where it lies relative to its own surface. `mirror` (B,): the bone on the other side, its own
+    index in the middle, negative for none; without it nothing is made symmetric. `landmarks` (L, 2): a vertex of the
+    donor and one of the mesh each.
     """
 
 def start_embed_skeleton(
@@ -517,7 +613,12 @@ def start_embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Job:
     """The same as a job, whose result is an `Embedding`."""

@@ -148,7 +148,7 @@ class TestSeveralTargets:
             plain(body, *bad, skip_failing=True, **self.SETTINGS)
 
     def test_by_the_operator(self, targets):
-        _body, good, bad = targets
+        _, good, bad = targets
         builders.select(*good, *bad)
         with pytest.raises(RuntimeError, match="(?s)Prop.*Crate"):
             bpy.ops.skinwright.transfer_weights(island_policy="SKIP")

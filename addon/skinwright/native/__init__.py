@@ -69,18 +69,40 @@ class Source:
 class Inpainting:
     """A body and a target prepared for solving again and again; keyword arguments as in the stub."""
 
-    def __init__(self, source: Source, name: str, positions: NDArray, triangles: NDArray, threads: int = 0) -> None:
+    def __init__(
+        self,
+        source: Source,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        threads: int = 0,
+        *,
+        edges: NDArray | None = None,
+        **settings: Any,
+    ) -> None:
         self.name = name
         with _naming(name):
-            self._inpainting = _module.Inpainting(source._source, positions, triangles, threads=threads)
+            self._inpainting = _module.Inpainting(
+                source._source, positions, triangles, target_edges=edges, threads=threads, **settings
+            )
         self.distance: NDArray[np.float32] = self._inpainting.distance
         self.angle: NDArray[np.float32] = self._inpainting.angle
         self.islands: NDArray[np.uint32] = self._inpainting.islands
+
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the source other weights; a solve with them factors nothing that is factored already."""
+        with _naming(self.name):
+            self._inpainting.set_source_weights(_module.Weights(*rows, n_columns))
 
     def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
         """(V,) which vertices match; waits for a job that is going on."""
         with _naming(self.name):
             return self._inpainting.matched(**thresholds)
+
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.confidence(**thresholds)
 
     def start(self, **params: Any) -> "Job":
         """Solve on threads of Rust's own."""
@@ -115,6 +137,32 @@ class Job:
         return transfer, _rows(transfer.weights)
 
 
+class EmbeddingJob(Job):
+    """An embedding going on."""
+
+    def result(self) -> Any:
+        """skinwright_native.Embedding; waits for it."""
+        with _naming(self._name):
+            return self._job.result()
+
+
+def start_embedding(
+    name: str, mesh: tuple[NDArray, NDArray], bones: tuple[NDArray, NDArray, NDArray], donor: tuple, **options: Any
+) -> EmbeddingJob:
+    """A skeleton into a mesh, on threads of Rust's own; keyword arguments as in the stub.
+
+    `mesh` is positions and triangles; `bones` are heads, tails, parents; `donor` is empty or positions, triangles and
+    rows of the character that the bones were made for.
+    """
+    keywords = dict(options)
+    with _naming(name):
+        if donor:
+            positions, triangles, rows = donor
+            keywords |= {"donor_positions": positions, "donor_triangles": triangles}
+            keywords["donor_weights"] = _module.Weights(*rows, len(bones[0]))
+        return EmbeddingJob(name, _module.start_embed_skeleton(*mesh, *bones, **keywords))
+
+
 def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
     """Weights of one character for another, on threads of Rust's own; keyword arguments as in the stub.
 
@@ -127,10 +175,65 @@ def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **option
         return Job(name, _module.start_retarget_weights(*arrays, **options))
 
 
+class Refiner:
+    """A character prepared for refinement; keyword arguments as in the stub."""
+
+    def __init__(
+        self,
+        name: str,
+        positions: NDArray,
+        triangles: NDArray,
+        rows: Rows,
+        n_bones: int,
+        parents: NDArray,
+        segments: NDArray,
+        **options: Any,
+    ) -> None:
+        self.name = name
+        with _naming(name):
+            weights = _module.Weights(*rows, n_bones)
+            self._refiner = _module.Refiner(positions, triangles, weights, parents, segments, **options)
+
+    def solve(self, pose_from_rest: NDArray, quality: str = "live") -> NDArray[np.float32]:
+        """(V, 3) of a pose (B, 4, 4)."""
+        with _naming(self.name):
+            return self._refiner.solve(pose_from_rest, quality=quality)
+
+    def measure(self, pose_from_rest: NDArray, positions: NDArray) -> dict[str, Any]:
+        """Pairs, and volume and bulge of each joint, for positions (V, 3) in a pose."""
+        with _naming(self.name):
+            return self._refiner.measure(pose_from_rest, positions)
+
+
+def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: NDArray | None) -> NDArray[np.float32]:
+    """(V, 3) as Blender's Armature modifier poses them: linearly, or with Preserve Volume given rest matrices."""
+    weights = _module.Weights(*rows, len(pose_from_rest))
+    if rest_bones is None:
+        return _module.linear_blend(positions, weights, pose_from_rest)
+    return _module.dual_quaternion_blend(positions, weights, pose_from_rest, rest_bones=rest_bones)
+
+
+def closest(
+    name: str, positions: NDArray, triangles: NDArray, rows: Rows, n_bones: int, queries: NDArray
+) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]:
+    """Triangle (n,), distance (n,) and barycentric shares (n, 3) of the surface point nearest to each query (n, 3)."""
+    with _naming(name):
+        source = _module.Source(positions, triangles, _module.Weights(*rows, n_bones))
+        return source.closest_points(queries)
+
+
 def desparsify(name: str, rows: Rows, n_bones: int, parents: NDArray, **options: Any) -> Rows:
     """Rows with exactly n members each, where there are bones to give; keyword arguments as in the stub."""
     with _naming(name):
         return _rows(_module.desparsify(_module.Weights(*rows, n_bones), parents, **options))
+
+
+def start_automatic_weights(
+    name: str, positions: NDArray, triangles: NDArray, segments: NDArray, parents: NDArray, **options: Any
+) -> Job:
+    """Compute automatic weights on threads of Rust's own; keyword arguments as in the stub."""
+    with _naming(name):
+        return Job(name, _module.start_automatic_weights(positions, triangles, segments, parents, **options))
 
 
 def linear_blend(name: str, rest: NDArray, rows: Rows, pose_from_rest: NDArray) -> NDArray[np.float32]:

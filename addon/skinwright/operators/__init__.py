@@ -1,12 +1,15 @@
 """Operators, one file or folder per feature."""
 
 from . import (
+    automatic_weights,
     bone_map,
     check_weights,
     desparsify,
+    embed_armature,
     match,
     panel_buttons,
     presets,
+    refine,
     retarget_weights,
     sculpt,
     stored_weights,
@@ -22,10 +25,13 @@ MODULES = (
     presets,
     *match.MODULES,
     check_weights,
+    automatic_weights,
     desparsify,
     *sculpt.MODULES,
+    *refine.MODULES,
     stored_weights,
     panel_buttons,
     retarget_weights,
     bone_map,
+    embed_armature,
 )

@@ -46,7 +46,7 @@ class SKINWRIGHT_OT_bone_map_save(ExportHelper, SkinwrightOperator):
     bl_label = "Save Bone Map"
     bl_description = "Save the bone map as a JSON file, to be used for other characters with the same rigs"
     filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"}, name="Filter", description="Files shown")
 
     @classmethod
     def refusal(cls, context: Context) -> str:
@@ -75,7 +75,7 @@ class SKINWRIGHT_OT_bone_map_load(ImportHelper, SkinwrightOperator):
     bl_description = "Load a bone map from a JSON file; bones it does not name are matched automatically"
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"}, name="Filter", description="Files shown")
 
     @classmethod
     def refusal(cls, context: Context) -> str:

@@ -178,7 +178,7 @@ class _File:
 
 
 class SKINWRIGHT_OT_export_weights(_File, _OnMeshes):
-    """docs/weights_format.md describes the files."""
+    """docs/pages/stored.md describes the files."""
 
     bl_idname = "skinwright.export_weights"
     bl_label = "Export Weights"

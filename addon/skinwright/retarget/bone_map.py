@@ -1,4 +1,4 @@
-"""Which bone of the source is which of the target: by name, by convention, by place in the hierarchy and in the body."""
+"""Which bone of the source is which of the target: by name, by convention, by place in hierarchy and body."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -16,7 +16,7 @@ Landmark = tuple[str, int, str, int]
 
 @dataclass(frozen=True)
 class RetargetParams(Params):
-    """`bone_map` names the source's bone for bones of the target ("" for none); the others are matched by name and place.
+    """`bone_map` names the source's bone for bones of the target ("" for none); the others are matched automatically.
 
     `landmarks` are used by the Biharmonic method, beside those that the bones give.
     """
@@ -28,7 +28,7 @@ class RetargetParams(Params):
         choices={
             "skeleton": (
                 "Skeleton",
-                "Bring the target into the source's pose and proportions, then match the surfaces",
+                "Bring the target into the source's pose and proportions, then match surfaces",
             ),
             "biharmonic": ("Biharmonic", "Match by distances along the surface to landmarks beside the joints"),
         },

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 from mathutils import Matrix
@@ -41,15 +42,15 @@ def _parents(obj: bpy.types.Object, sources: list[bpy.types.Object], world: Matr
         return []
     if obj.parent_type == "BONE" and parent.type == "ARMATURE":
         phrase = f"is parented to the bone {obj.parent_bone} of {parent.name}"
-        return [Follower(phrase, lambda: _let_go(obj, parent, world))]
+        return [Follower(phrase, partial(_let_go, obj, parent, world))]
     if obj.parent_type in ("VERTEX", "VERTEX_3") and parent in sources:
-        return [Follower(f"is parented to vertices of {parent.name}", lambda: _let_go(obj, parent.parent, world))]
+        return [Follower(f"is parented to vertices of {parent.name}", partial(_let_go, obj, parent.parent, world))]
     carried = parent
     while carried.parent and carried.parent_type != "BONE":
         carried = carried.parent
     if carried.parent and carried.parent_type == "BONE":
         phrase = f"hangs on {carried.name}, which is parented to the bone {carried.parent_bone}"
-        return [Follower(phrase, lambda: _let_go(obj, carried.parent, world))]
+        return [Follower(phrase, partial(_let_go, obj, carried.parent, world))]
     return []
 
 
@@ -66,7 +67,7 @@ def _constraints(obj: bpy.types.Object, world: Matrix) -> list[Follower]:
         followed = [target for target in armature.constraint_targets(constraint) if _is_carried(target, constraint)]
         if followed:
             phrase = f"has the constraint {constraint.name}, which follows {followed[0].name}"
-            found.append(Follower(phrase, lambda c=constraint: _mute(obj, c, world)))
+            found.append(Follower(phrase, partial(_mute, obj, constraint, world)))
     return found
 
 
@@ -94,7 +95,7 @@ def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[F
     for modifier in armature.modifiers(obj):
         phrase = _binding_phrase(modifier, models, armature.rigs(sources[0])) if modifier.show_viewport else ""
         if phrase:
-            found.append(Follower(phrase, lambda m=modifier: obj.modifiers.remove(m)))
+            found.append(Follower(phrase, partial(obj.modifiers.remove, modifier)))
     return found
 
 
@@ -136,7 +137,7 @@ def _surfaces(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Fo
             followed = modifier.object
         if followed and (followed in sources or armature.rigs(followed) or followed.type == "ARMATURE"):
             phrase = f"has the modifier {modifier.name}, which follows {followed.name} too"
-            found.append(Follower(phrase, lambda m=modifier: _hide(m)))
+            found.append(Follower(phrase, partial(_hide, modifier)))
     return found
 
 
@@ -148,7 +149,7 @@ def _overruling(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
             break
         if modifiers.transfers_weights(modifier) or modifiers.written_group(modifier) in groups:
             phrase = f"has the modifier {modifier.name}, which overrules the weights written"
-            found.append(Follower(phrase, lambda m=modifier: _hide(m)))
+            found.append(Follower(phrase, partial(_hide, modifier)))
     return found
 
 

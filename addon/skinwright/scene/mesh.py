@@ -16,10 +16,14 @@ from .error import SceneError
 
 @dataclass(frozen=True)
 class Geometry:
-    """positions (V, 3) f32 in world units, triangles (T, 3) u32 whose winding gives outward normals in the world."""
+    """positions (V, 3) f32 in world units, triangles (T, 3) u32 whose winding gives outward normals in the world.
+
+    `wires` (E, 2) u32 are the edges of no face.
+    """
 
     positions: NDArray[np.float32]
     triangles: NDArray[np.uint32]
+    wires: NDArray[np.uint32]
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -39,18 +43,19 @@ def read(obj: bpy.types.Object) -> Geometry:
 
     Raises SceneError for an empty mesh, a coordinate that is not finite and a world matrix that flattens the object.
     """
-    return placed(obj, obj.matrix_world, rest_positions(obj.data), triangles(obj))
+    return placed(obj, obj.matrix_world, rest_positions(obj.data), obj.data)
 
 
-def placed(obj: bpy.types.Object, matrix: Matrix, local: NDArray[np.float32], triangle: NDArray[np.uint32]) -> Geometry:
-    """Local positions (V, 3) and triangles (T, 3) of `obj` in the world that its `matrix` leads to."""
+def placed(obj: bpy.types.Object, matrix: Matrix, local: NDArray[np.float32], shape: bpy.types.Mesh) -> Geometry:
+    """Local positions (V, 3) of `obj`, in the world that its `matrix` leads to, with the faces and wires of `shape`."""
+    triangle = triangles_of(obj, shape)
     world = np.array(matrix, dtype=np.float64)
     if _checked_determinant(obj, world) < 0:
         triangle = triangle[:, ::-1]
     with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
         positions = transformed(local, world)
     _check_finite(obj, positions)
-    return Geometry(positions, np.ascontiguousarray(triangle))
+    return Geometry(positions, np.ascontiguousarray(triangle), wires_of(shape))
 
 
 def transformed(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -133,10 +138,14 @@ def in_collections_of(obj: bpy.types.Object) -> list[bpy.types.Object]:
 
 @contextmanager
 def object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it."""
+    """Leave Edit mode, where weights can be neither read nor written, and come back with the same objects in it.
+
+    What scripts have just moved, added or removed is where it now is.
+    """
     edited = list(context.objects_in_mode) if context.mode == "EDIT_MESH" else []
     if edited:
         bpy.ops.object.mode_set(mode="OBJECT")
+    context.view_layer.update()
     try:
         yield
     finally:
@@ -196,14 +205,18 @@ def _check_finite(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None
 
 
 def triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
-    """(T, 3) of its faces as they are, before modifiers. Raises SceneError where there are none."""
+    """(T, 3) of its faces as they are, before modifiers. Raises SceneError if there are none."""
+    if not obj.data.polygons:
+        raise SceneError(f"{obj.name} has no faces: this works along surfaces, so give it some")
     return triangles_of(obj, obj.data)
 
 
 def triangles_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> NDArray[np.uint32]:
     """(T, 3) of a mesh of the object: its own, or one that its modifiers leave."""
+    if not mesh.polygons and not mesh.edges:
+        raise SceneError(f"{obj.name} has no faces and no edges: weights are carried over them, so give it some")
     if not mesh.polygons:
-        raise SceneError(f"{obj.name} has no faces: weights are carried over surfaces, so give it some")
+        return np.empty((0, 3), np.uint32)
     corners = mesh.attributes.get(".corner_vert")  # not there in Edit mode
     if corners and len(mesh.loops) == 3 * len(mesh.polygons):  # triangles only: these are read a hundred times as fast
         triangle = np.empty(len(mesh.loops), np.int32)
@@ -213,3 +226,19 @@ def triangles_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> NDArray[np.uint
         triangle = np.empty(len(mesh.loop_triangles) * 3, np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangle)
     return triangle.reshape(-1, 3).astype(np.uint32)
+
+
+def wires_of(mesh: bpy.types.Mesh) -> NDArray[np.uint32]:
+    """(E, 2) the edges of no face."""
+    vertices, loose = np.empty(len(mesh.edges) * 2, np.int32), np.empty(len(mesh.edges), bool)
+    mesh.edges.foreach_get("is_loose", loose)
+    if not loose.any():
+        return np.empty((0, 2), np.uint32)
+    mesh.edges.foreach_get("vertices", vertices)
+    return vertices.reshape(-1, 2)[loose].astype(np.uint32)
+
+
+def check_faces(obj: bpy.types.Object, geometry: Geometry) -> None:
+    """Raise SceneError for a source that has no surface."""
+    if not len(geometry.triangles):
+        raise SceneError(f"{obj.name} has no faces: weights are taken from a surface, so pick a mesh that has one")

@@ -1,8 +1,8 @@
 """Test poses: an armature is put into each in turn, and afterwards is as it was."""
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -97,9 +97,8 @@ def take(obj: bpy.types.Object, bones: Sequence[str], pose_from_rest: NDArray[np
     """
     rigs = scene_armature.rigs(obj)
     wanted = dict(zip(bones, pose_from_rest, strict=True))
-    with ExitStack() as undo:
-        for rig in rigs:
-            undo.enter_context(_restored(rig))
+    undo = [_saved(rig) for rig in rigs]
+    try:
         for rig in rigs:
             _set_matrices(rig, wanted)
         now = scene_armature.world_pose(rigs, list(bones))
@@ -110,7 +109,10 @@ def take(obj: bpy.types.Object, bones: Sequence[str], pose_from_rest: NDArray[np
                 f"{len(astray)} bones of {rigs[0].name}, {astray[0]} for one, follow constraints or drivers and cannot "
                 "be put into this pose: the overlay Faults shows the offenders all the same"
             )
-        undo.pop_all()  # done: let the pose stay
+    except BaseException:
+        for restore in undo:
+            restore()
+        raise
 
 
 def _set_matrices(rig: bpy.types.Object, wanted: dict[str, NDArray[np.floating]]) -> None:
@@ -147,18 +149,28 @@ def at_rest(armature: bpy.types.Object) -> Iterator[None]:
 @contextmanager
 def _restored(armature: bpy.types.Object) -> Iterator[None]:
     """Bring back every channel of every bone, bit for bit, and let the pose be shown meanwhile."""
-    bones = armature.pose.bones
-    before = [[tuple(getattr(bone, channel)) for channel in _CHANNELS] for bone in bones]
-    position = armature.data.pose_position
+    restore = _saved(armature)
     armature.data.pose_position = "POSE"
     try:
         yield
     finally:
+        restore()
+
+
+def _saved(armature: bpy.types.Object) -> Callable[[], None]:
+    """What brings the pose back, bit for bit."""
+    bones = armature.pose.bones
+    before = [[tuple(getattr(bone, channel)) for channel in _CHANNELS] for bone in bones]
+    position = armature.data.pose_position
+
+    def restore() -> None:
         for bone, values in zip(bones, before, strict=True):
             for channel, value in zip(_CHANNELS, values, strict=True):
                 setattr(bone, channel, value)
         armature.data.pose_position = position
         bpy.context.view_layer.update()
+
+    return restore
 
 
 def _curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:

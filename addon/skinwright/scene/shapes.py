@@ -47,7 +47,7 @@ def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Sh
         evaluated = shown.evaluated_get(depsgraph)
         seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
         try:
-            geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), mesh.triangles_of(obj, seen))
+            geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
             rows = vertex_groups.read_evaluated(evaluated, seen, names)
         finally:
             evaluated.to_mesh_clear()
@@ -60,7 +60,7 @@ def read_target(obj: bpy.types.Object, look: Look) -> Shape:
         return _plain(obj)
     with _evaluable(obj) as shown:
         local, unseen = _kept_positions(shown, look)
-        geometry = mesh.placed(obj, shown.matrix_world, local, mesh.triangles(obj))
+        geometry = mesh.placed(obj, shown.matrix_world, local, obj.data)
         return Shape(geometry, np.array(shown.matrix_world), unseen)
 
 

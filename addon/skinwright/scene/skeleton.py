@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+_FOLLOWING = {"ARMATURE", "CHILD_OF", "COPY_LOCATION", "COPY_ROTATION", "COPY_TRANSFORMS"}
 # Of the armature's size: what still counts as touching.
 _TOUCHING = 1e-3
 
@@ -56,8 +57,8 @@ def _parents_first(parent: dict[str, str]) -> list[str]:
 def _carriers(rig: bpy.types.Object) -> dict[str, str]:
     """The deform bone that each deform bone hangs on, or nothing.
 
-    In generated and copied rigs deform bones hang on bones that only control: then it is the deform bone that lies on
-    such a control, or else, for a bone that constraints or controls hold, the one whose tail it starts from.
+    In generated and copied rigs deform bones hang on, or follow, bones that only control: then it is the deform bone
+    that follows such a control or lies on it, or else the one whose tail the bone starts from.
     """
     bones = rig.data.bones
     deforming = [bone for bone in bones if bone.use_deform]
@@ -65,37 +66,62 @@ def _carriers(rig: bpy.types.Object) -> dict[str, str]:
         return {}
     heads, tails = (np.array([getattr(b, end) for b in deforming]) for end in ("head_local", "tail_local"))
     touching = _TOUCHING * float(np.linalg.norm(np.ptp(np.concatenate([heads, tails]), axis=0)))
+    leaders = {bone.name: _leader(rig.pose.bones[bone.name]) for bone in deforming}
+    followers = {leader: name for name, leader in leaders.items() if leader}
     found: dict[str, str] = {}
     for number, bone in enumerate(deforming):
-        held = any(not constraint.mute for constraint in rig.pose.bones[bone.name].constraints)
         below = {bone.name} | {child.name for child in bone.children_recursive}
-        for candidate in _candidates(bone, deforming, heads, tails, number, touching, held):
-            if candidate not in below and not _hangs_on(found, candidate, bone.name):
-                found[bone.name] = candidate
-                break
-        else:
-            found[bone.name] = ""
+        candidates = [
+            *_above(bone, rig, followers, deforming, heads, tails, number, touching),
+            *_above(leaders[bone.name], rig, followers, deforming, heads, tails, number, touching),
+            *(_before(deforming, heads, tails, number, touching) if bone.parent or leaders[bone.name] else ()),
+        ]
+        good = (name for name in candidates if name not in below and not _hangs_on(found, name, bone.name))
+        found[bone.name] = next(good, "")
     return found
 
 
-def _candidates(
-    bone: bpy.types.Bone,
+def _leader(bone: bpy.types.PoseBone) -> bpy.types.Bone | None:
+    """The bone that a constraint makes this one follow."""
+    for constraint in bone.constraints:
+        if constraint.mute or constraint.type not in _FOLLOWING:
+            continue
+        targets = constraint.targets if constraint.type == "ARMATURE" else [constraint]
+        for target in targets:
+            if target.target and target.target.type == "ARMATURE" and target.subtarget in target.target.data.bones:
+                return target.target.data.bones[target.subtarget]
+    return None
+
+
+def _above(
+    bone: bpy.types.Bone | None,
+    rig: bpy.types.Object,
+    followers: dict[bpy.types.Bone, str],
     deforming: list[bpy.types.Bone],
     heads: NDArray,
     tails: NDArray,
     number: int,
     touching: float,
-    held: bool,
 ) -> Iterator[str]:
-    for ancestor in bone.parent_recursive:
-        if ancestor.use_deform:
+    """The deform bones that are above a bone, that follow one above, or that lie on one above."""
+    for ancestor in bone.parent_recursive if bone else ():
+        mine = ancestor.id_data == rig.data
+        if mine and ancestor.use_deform:
             yield ancestor.name
-            return
-        on_it = np.flatnonzero((_distance(heads, ancestor) <= touching) & (_distance(tails, ancestor) <= touching))
-        gap = np.minimum(np.linalg.norm(tails - heads[number], axis=1), np.linalg.norm(heads - heads[number], axis=1))
-        yield from (deforming[i].name for i in on_it[np.argsort(gap[on_it], kind="stable")].tolist())
-    if not bone.parent and not held:
-        return  # a root, as the artist made it
+        if ancestor in followers:
+            yield followers[ancestor]
+        if mine:
+            on_it = (_distance(heads, ancestor) <= touching) & (_distance(tails, ancestor) <= touching)
+            ends = (np.linalg.norm(points - heads[number], axis=1) for points in (heads, tails))
+            gap = np.minimum(*ends)
+            order = np.flatnonzero(on_it)[np.argsort(gap[on_it], kind="stable")]
+            yield from (deforming[i].name for i in order.tolist())
+
+
+def _before(
+    deforming: list[bpy.types.Bone], heads: NDArray, tails: NDArray, number: int, touching: float
+) -> Iterator[str]:
+    """The deform bones whose tail is where this one starts."""
     gap = np.linalg.norm(tails - heads[number], axis=1)
     yield from (deforming[i].name for i in np.argsort(gap, kind="stable").tolist() if gap[i] <= touching)
 

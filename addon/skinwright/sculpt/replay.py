@@ -21,14 +21,18 @@ from .session import SculptSession
 __all__ = ["options_from_json", "read", "replay"]
 
 Sculpts = dict[str, NDArray]
+# Kinds of NumPy types that each array may have.
+_KINDS = {"positions": "fiu", "frames": "iu", "bones": "U", "matrices": "fiu"}
 
 
 def read(path: Path) -> Sculpts:
     """The arrays of a file. Raises SceneError where they do not fit together."""
     try:
-        with np.load(path) as file:
+        with np.load(path, allow_pickle=False) as file:
             sculpts = {name: file[name] for name in file.files}
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read: {error}") from error
+    except Exception as error:  # numpy, zipfile and zlib each have their own
         raise SceneError(f"{path} cannot be read as an .npz file: {error}") from error
     problem = _problem(sculpts)
     if problem:
@@ -39,13 +43,20 @@ def read(path: Path) -> Sculpts:
 def _problem(sculpts: Sculpts) -> str:
     if "positions" not in sculpts or sculpts["positions"].ndim != 3 or sculpts["positions"].shape[2] != 3:
         return "it needs an array `positions` of shape (sculpts, vertices, 3)"
+    for name, kinds in _KINDS.items():
+        if name in sculpts and sculpts[name].dtype.kind not in kinds:
+            return f"`{name}` is of the type {sculpts[name].dtype}, which cannot be used"
     count = len(sculpts["positions"])
     if "frames" in sculpts:
         return "" if sculpts["frames"].shape == (count,) else f"`frames` must have shape ({count},)"
     if "bones" not in sculpts or "matrices" not in sculpts:
         return "it needs `frames`, or `bones` and `matrices`, to say in which pose was sculpted"
+    if sculpts["bones"].ndim != 1:
+        return "`bones` must be a list of names"
     expected = (count, len(sculpts["bones"]), 4, 4)
-    return "" if sculpts["matrices"].shape == expected else f"`matrices` must have shape {expected}"
+    if sculpts["matrices"].shape != expected:
+        return f"`matrices` must have shape {expected}"
+    return "" if np.isfinite(sculpts["matrices"]).all() else "`matrices` must be finite numbers"
 
 
 def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> SculptReport:
@@ -53,6 +64,9 @@ def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> Sc
 
     Raises SceneError or native.NativeError with the object as it was.
     """
+    problem = _problem(sculpts)
+    if problem:
+        raise SceneError(f"The sculpts of {obj.name} cannot be used: {problem}")
     n = sculpts["positions"].shape[1]
     if n != len(obj.data.vertices):
         raise SceneError(f"{obj.name} has {len(obj.data.vertices)} vertices, but {n} were sculpted: use the same mesh")

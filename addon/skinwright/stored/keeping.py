@@ -72,9 +72,10 @@ def keep(obj: bpy.types.Object, name: str, *, automatic: bool = False, state: Re
 
 
 def keep_before(objects: Sequence[bpy.types.Object], operation: str) -> None:
-    """The state made by itself before an operation writes; the last few are kept."""
+    """The state made by itself before an operation writes; the last few are kept. No weights are nothing to keep."""
     for obj in {obj.data: obj for obj in objects}.values():
-        keep(obj, f"Before {operation}", automatic=True)
+        if obj.vertex_groups:
+            keep(obj, f"Before {operation}", automatic=True)
 
 
 def load(obj: bpy.types.Object, number: int = -1, name: str = "") -> Record:

@@ -1,6 +1,6 @@
 """One state of an object's weights with the shape it belongs to, as .npz or as JSON; numpy only, readable anywhere.
 
-docs/weights_format.md describes both files. Neither holds pickled objects.
+docs/pages/stored.md describes both files. Neither holds pickled objects.
 """
 
 import io

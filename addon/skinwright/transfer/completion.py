@@ -76,18 +76,24 @@ def _reflect(done: Completion, reflection: Reflection) -> Completion:
     apart = np.linalg.norm(mirrored - positions, axis=1) > reflection.merged
     number = np.arange(len(positions), dtype=np.int64)
     number[apart] = len(positions) + np.arange(int(apart.sum()), dtype=np.int64)
-    copies = number[triangles.astype(np.int64)][:, ::-1]
-    copies = copies[apart[triangles.astype(np.int64)].any(axis=1)]
     return Completion(
         Geometry(
             np.concatenate([positions, mirrored[apart]]),
-            np.ascontiguousarray(np.concatenate([triangles, copies.astype(np.uint32)])),
+            _with_copies(triangles, number, apart),
+            _with_copies(done.geometry.wires, number, apart),
         ),
         done.n_own,
         np.concatenate([done.image, number[done.image]]),
         np.concatenate([done.origin, done.origin]),
         np.concatenate([done.flipped, ~done.flipped]),
     )
+
+
+def _with_copies(elements: NDArray[np.uint32], number: NDArray[np.int64], apart: NDArray[np.bool_]) -> NDArray:
+    """Triangles or edges (n, k) and their mirrored copies, turned over; none of what lies in the mirror."""
+    own = elements.astype(np.int64)
+    copies = number[own][apart[own].any(axis=1)][:, ::-1]
+    return np.ascontiguousarray(np.concatenate([elements, copies.astype(np.uint32)]))
 
 
 def symmetrised(done: Completion, opposite_vertex: NDArray[np.int64]) -> Completion:

@@ -5,8 +5,7 @@ The functions are generators: each yields a job and is sent what it gave, so tha
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,10 @@ from .. import csr, native
 from ..csr import Rows
 from ..jobs import Jobs
 from ..scene.mesh import Geometry
-from . import merging, parts, scalar_fields
+from . import completion, merging, parts, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
+from .prepared import Prepared
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,14 @@ def compute(
     body: Body, garments: list[Garment], params: TransferParams
 ) -> Jobs[tuple[dict[str, Result], list[Failure]]]:
     """The new rows by target's name, and the targets that have no answer."""
-    bones = bone_source(body) if body.bones else None
-    fields = None
-    if body.fields:
-        packed = scalar_fields.pack(body.field_weights, len(body.fields))
-        fields = _source(body, packed, len(body.fields) + 1)
+    packed = scalar_fields.pack(body.field_weights, len(body.fields)) if body.fields else None
+    with_bones = bool(set(body.bones) & body.chosen)
+    source = bone_source(body) if with_bones or packed is None else _source(body, packed, len(body.fields) + 1)
     results: dict[str, Result] = {}
     failures: list[Failure] = []
     for together in solved_together(garments, params):
         try:
-            found = yield from _compute_group(body, together, bones, fields, params)
+            found = yield from _compute_group(body, together, source, packed, params)
         except native.NativeError as error:
             failures.append(Failure(" + ".join(garment.object.name for garment in together), str(error)))
         else:
@@ -87,71 +85,9 @@ def bone_source(body: Body) -> native.Source:
     return _source(body, body.bone_weights, len(body.bones))
 
 
-class Prepared:
-    """Targets laid over a body as one mesh; the mask and the thresholds may still change.
-
-    Arrays are those of the targets' own vertices, one target after the other: no mirrored halves.
-    """
-
-    def __init__(self, source: native.Source, garments: Sequence[Garment], threads: int) -> None:
-        self.garments = garments
-        self.name = " + ".join(garment.object.name for garment in garments)
-        geometry = parts.united([garment.geometry for garment in garments])
-        self._inpainting = native.Inpainting(source, self.name, geometry.positions, geometry.triangles, threads)
-
-    @cached_property
-    def distance(self) -> NDArray[np.float32]:
-        """(V,) world units."""
-        return self._own(self._inpainting.distance)
-
-    @cached_property
-    def angle(self) -> NDArray[np.float32]:
-        """(V,) radians."""
-        return self._own(self._inpainting.angle)
-
-    @cached_property
-    def islands(self) -> NDArray[np.uint32]:
-        """(V,) the loose part of each vertex."""
-        return self._own(self._inpainting.islands)
-
-    def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
-        """(V,) which vertices match; waits for a job that is going on. `mask` (V,) may be among the keywords."""
-        mask = thresholds.pop("mask", None)
-        return self._own(self._inpainting.matched(mask=self._spread([mask]), **thresholds))
-
-    def start(self, masks: Sequence[NDArray[np.uint8] | None], **params: Any) -> native.Job:
-        """Solve on threads of Rust's own; a mask (V,) or None for each target."""
-        return self._inpainting.start(mask=self._spread(masks), **params)
-
-    def split(self, values: NDArray) -> list[NDArray]:
-        """Values of all vertices, mirrored ones too, as those of each target's own."""
-        starts = np.cumsum([0, *(len(g.geometry.positions) for g in self.garments)], dtype=np.int64)
-        own = [garment.completion.n_own for garment in self.garments]
-        return [values[start : start + n] for start, n in zip(starts, own, strict=False)]
-
-    def rows_of(self, rows: Rows, number: int) -> Rows:
-        """The rows of one target's vertices, mirrored ones too."""
-        sizes = [len(garment.geometry.positions) for garment in self.garments]
-        start = sum(sizes[:number])
-        return csr.take_rows(rows, np.arange(start, start + sizes[number], dtype=np.int64))
-
-    def _own(self, values: NDArray) -> NDArray:
-        found = self.split(values)
-        return found[0] if len(found) == 1 else np.concatenate(found)
-
-    def _spread(self, masks: Sequence[NDArray[np.uint8] | None]) -> NDArray[np.uint8] | None:
-        if all(mask is None for mask in masks):
-            return None
-        full = [
-            np.ones(garment.completion.n_own, np.uint8) if mask is None else mask
-            for garment, mask in zip(self.garments, masks, strict=True)
-        ]
-        return np.concatenate([g.completion.spread(mask) for g, mask in zip(self.garments, full, strict=True)])
-
-
 def prepare(source: native.Source, garment: Garment, params: TransferParams) -> Prepared:
     """One target laid over the body."""
-    return Prepared(source, [garment], params.threads)
+    return Prepared(source, [garment], params)
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
@@ -162,26 +98,37 @@ def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
 def _compute_group(
     body: Body,
     garments: list[Garment],
-    bones: native.Source | None,
-    fields: native.Source | None,
+    source: native.Source,
+    packed: Rows | None,
     params: TransferParams,
 ) -> Jobs[list[Result]]:
-    """The results of targets that are solved together."""
+    """The results of targets that are solved together; `packed` are the weights of the fields."""
     start = time.perf_counter()
-    names: list[str] = []
+    prepared = Prepared(source, garments, params)
+    lost = prepared.lost_halves()
+    if any(lost):
+        # A mirrored half with nothing to match would be solved from this half's side and then drag it to the middle.
+        alone = [replace(g, completion=completion.plain(g.shape.geometry)) for g in garments]
+        garments = [other if gone else g for g, other, gone in zip(garments, alone, lost, strict=True)]
+        prepared = Prepared(source, garments, params)
+    with_bones = bool(set(body.bones) & body.chosen)
+    names = [garment.names if with_bones else [] for garment in garments]
     rows = [csr.empty(len(garment.writable)) for garment in garments]
-    if fields:
-        prepared = Prepared(fields, garments, params.threads)
-        answers, rows = yield from _field_rows(prepared, body, params)
-        names = body.fields
-    if bones:
-        prepared = Prepared(bones, garments, params.threads)
-        answers, of_bones = yield from _bone_rows(prepared, [g.mask for g in garments], params)
-        rows = [csr.beside(left, len(names), right) for left, right in zip(rows, of_bones, strict=True)]
+    answers: list[Answer] = []
+    if with_bones:
+        answers, rows = yield from _bone_rows(prepared, [g.mask for g in garments], params)
+    if packed is not None:
+        if with_bones:
+            # Points and factorisations are those of the bones: only the solve is done again.
+            prepared.set_source_weights(packed, len(body.fields) + 1)
+        of_fields, field_rows = yield from _field_rows(prepared, body, params)
+        answers = answers or of_fields
+        rows = [csr.beside(left, len(body.fields), right) for left, right in zip(field_rows, rows, strict=True)]
+        names = [body.fields + each for each in names]
     seconds = (time.perf_counter() - start) / len(garments)
     return [
-        to_result(body, garment, answer, names + (garment.names if bones else []), row, seconds)
-        for garment, answer, row in zip(garments, answers, rows, strict=True)
+        to_result(body, garment, answer, name, row, seconds)
+        for garment, answer, name, row in zip(garments, answers, names, rows, strict=True)
     ]
 
 
@@ -212,7 +159,7 @@ def _bone_rows(
     joined = any(_joins_old_weights(garment, params) for garment in prepared.garments)
     # Where old weights or mirror images join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
-    transfer, solved = yield prepared.start(masks, **_keywords(params, limit))
+    transfer, solved = yield prepared.start(masks, params, limit)
     rows = []
     for number, garment in enumerate(prepared.garments):
         folded = garment.completion.fold(prepared.rows_of(solved, number), garment.opposite)
@@ -256,16 +203,10 @@ def _check(garment: Garment, rows: Rows, max_influences: int) -> None:
 def _field_rows(prepared: Prepared, body: Body, params: TransferParams) -> Jobs[tuple[list[Answer], list[Rows]]]:
     n = len(body.fields)
     masks = [garment.mask for garment in prepared.garments]
-    transfer, solved = yield prepared.start(masks, **_keywords(params, max_influences=0))
+    transfer, solved = yield prepared.start(masks, params, max_influences=0)
     same = np.arange(n + 1, dtype=np.int64)
     rows = []
     for number, garment in enumerate(prepared.garments):
         folded = garment.completion.fold(prepared.rows_of(solved, number), same)
         rows.append(merging.mix(scalar_fields.unpack(folded, n), garment.fields_before, params.mix_factor))
     return _answers(prepared, transfer), rows
-
-
-def _keywords(params: TransferParams, max_influences: int) -> dict[str, Any]:
-    keywords = params.native() | {"max_influences": max_influences}
-    del keywords["threads"]
-    return keywords

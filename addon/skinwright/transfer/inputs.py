@@ -1,4 +1,4 @@
-"""What a transfer reads from the source and from each target."""
+"""What a transfer reads from each target; body.py reads the source."""
 
 import time
 from dataclasses import dataclass
@@ -7,49 +7,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import csr
 from ..csr import Rows
 from ..scene import armature, binding, mask, mesh, mirror, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
-from . import completion, merging, parts
+from . import completion, merging
+from .body import Body, read_body
 from .completion import Completion
 from .params import Mask, TransferParams
 
-
-@dataclass(frozen=True)
-class Body:
-    """The source as read.
-
-    `objects` are the meshes that are its body, the picked one first; `rigs` the armatures that deform it. The rows over
-    `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks), each carried
-    over by itself. `chosen` names the groups to be written. `opposite` has the other side's bone of every bone.
-    """
-
-    object: bpy.types.Object
-    objects: list[bpy.types.Object]
-    rigs: list[bpy.types.Object]
-    geometry: mesh.Geometry
-    bones: list[str]
-    bone_weights: Rows
-    fields: list[str]
-    field_weights: Rows
-    chosen: set[str]
-    opposite: dict[str, str]
-
-    @property
-    def armature(self) -> bpy.types.Object | None:
-        """The armature that counts most."""
-        return self.rigs[0] if self.rigs else None
-
-    @property
-    def is_partial(self) -> bool:
-        """Whether only some of its bones are written."""
-        return not set(self.bones) <= self.chosen
-
-    @property
-    def name(self) -> str:
-        """All its meshes."""
-        return " + ".join(obj.name for obj in self.objects)
+__all__ = ["Body", "Garment", "read_body", "read_garment", "read_mask"]
 
 
 @dataclass(frozen=True)
@@ -60,7 +26,7 @@ class Garment:
     which the pose leads to what was seen. `locks` are all its locked groups. `names` are the body's bones,
     then the target's other bones; of these columns `held` marks those that stay as they are, `chosen` those that come
     from the body, and `opposite` has the other side's. The old weights, over `names` and the body's fields, are empty
-    where they take no part.
+    where they take no part. `distance` is the one in force if the target's size tells nothing of it.
     """
 
     object: bpy.types.Object
@@ -76,125 +42,13 @@ class Garment:
     opposite: NDArray[np.int64]
     before: Rows
     fields_before: Rows
+    distance: float | None
     seconds: float
 
     @property
     def geometry(self) -> mesh.Geometry:
         """The shape that is solved."""
         return self.completion.geometry
-
-
-def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bpy.types.Object] | None = None) -> Body:
-    """The source's shape and the weights of the groups that take part; `targets` are never part of it."""
-    objects = _body_objects(source, targets or [], params)
-    rigs = _rigs(objects)
-    bones, chosen = choose_groups(objects, rigs, params.groups)
-    fields = [name for name in chosen if name not in bones]
-    with shapes.looked_at(objects, params.geometry):
-        seen = [shapes.read_source(obj, params.geometry, bones + fields) for obj in objects]
-    rows = parts.united_rows([rows for _, rows in seen])
-    bone_weights, field_weights = _split_columns(rows, len(bones))
-    return Body(
-        object=source,
-        objects=objects,
-        rigs=rigs,
-        geometry=parts.united([shape.geometry for shape, _ in seen]),
-        bones=bones,
-        bone_weights=bone_weights,
-        fields=fields,
-        field_weights=field_weights,
-        chosen=set(chosen),
-        opposite=sides.opposites(rigs[0] if rigs else None, bones),
-    )
-
-
-def _split_columns(rows: Rows, n_left: int) -> tuple[Rows, Rows]:
-    """Rows over the first `n_left` columns, and over the rest."""
-    last = int(rows.bones.max(initial=0))
-    left = np.arange(max(last + 1, n_left), dtype=np.int64) < n_left
-    return csr.take_columns(rows, left), csr.take_columns(rows, ~left)
-
-
-def _body_objects(
-    source: bpy.types.Object, targets: list[bpy.types.Object], params: TransferParams
-) -> list[bpy.types.Object]:
-    """The picked mesh and those it stands for."""
-    others = {
-        "OBJECT": lambda: [],
-        "PARTS": lambda: _continuing(source, targets),
-        "ARMATURE": lambda: armature.deformed_meshes(armature.rigs(source)),
-        "COLLECTION": lambda: mesh.in_collections_of(source),
-    }[params.source_scope]()
-    found = [source, *(obj for obj in others if obj != source and obj not in targets)]
-    return [obj for obj in found if obj == source or (obj.vertex_groups and obj.data.polygons)]
-
-
-def _continuing(source: bpy.types.Object, targets: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The visible meshes on the source's armature whose borders lie on its own, as the head of a body in parts."""
-    rigs = armature.rigs(source)
-    others = [o for o in armature.deformed_meshes(rigs) if o != source and o not in targets and o.data.polygons]
-    if not others or not source.data.polygons:
-        return []
-    try:
-        geometries = [mesh.read(obj) for obj in (source, *others)]
-    except SceneError:  # one of them cannot be read: the source itself is read next, and says so
-        return []
-    together = next(group for group in parts.groups(geometries) if 0 in group)
-    return [others[number - 1] for number in together if number]
-
-
-def _rigs(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The armatures that deform them, which must be the same for all."""
-    rigs = armature.rigs(objects[0]) or [rig for rig in [armature.find(objects[0])] if rig]
-    for obj in objects[1:]:
-        other = [rig for rig in armature.rigs(obj) if rig not in rigs]
-        if other:
-            raise SceneError(
-                f"{obj.name} is deformed by {other[0].name} and {objects[0].name} is not: "
-                "weights of one body follow one armature, so leave one of the meshes out"
-            )
-    return rigs
-
-
-def choose_groups(
-    objects: list[bpy.types.Object], rigs: list[bpy.types.Object], subset: str
-) -> tuple[list[str], list[str]]:
-    """The groups that are bones, and those to be written. Without an armature all groups are, if all are wanted."""
-    source = objects[0]
-    groups = list(dict.fromkeys(group.name for obj in objects for group in obj.vertex_groups))
-    if not groups:
-        raise SceneError(f"{source.name} has no vertex groups to transfer: pick a body that has weights")
-    if not rigs:
-        return _choose_without_armature(source, groups, subset)
-    deforming = set().union(*(armature.deform_bones(rig) for rig in rigs))
-    active = source.vertex_groups.active
-    wanted = {
-        "ALL": set(groups),
-        "ACTIVE": {active.name if active else ""},
-        "BONE_DEFORM": deforming,
-        "BONE_SELECT": deforming.intersection(*[set().union(*(armature.selected_bones(rig) for rig in rigs))]),
-    }[subset]
-    # Where only a group's vertices follow an armature, the targets need that group.
-    wanted = wanted | armature.masking_groups(source)
-    chosen = [name for name in groups if name in wanted]
-    if not set(chosen) - armature.masking_groups(source):
-        kind = "selected deform bone" if subset == "BONE_SELECT" else "deform bone"
-        raise SceneError(
-            f"No vertex group of {source.name} has the name of a {kind} of {rigs[0].name}: "
-            "select other bones, rename the groups, or set Groups to All Groups"
-        )
-    return [name for name in groups if name in deforming], chosen
-
-
-def _choose_without_armature(source: bpy.types.Object, groups: list[str], subset: str) -> tuple[list[str], list[str]]:
-    if subset == "ALL":
-        return groups, groups
-    if subset == "ACTIVE":
-        return [], [source.vertex_groups.active.name]
-    raise SceneError(
-        f"{source.name} has no armature to tell which of its groups are bones: "
-        "give it an Armature modifier, or set Groups to All Groups"
-    )
 
 
 def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -> Garment:
@@ -224,6 +78,7 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
         opposite=_opposite_columns(body),
         before=vertex_groups.read(target, names if mixed or held.any() else []),
         fields_before=vertex_groups.read(target, body.fields if params.mix_factor < 1 else []),
+        distance=_wire_distance(shape.geometry, body, params),
         seconds=time.perf_counter() - start,
     )
     _check_locks(garment)
@@ -235,8 +90,9 @@ def _completed(target: bpy.types.Object, shape: shapes.Shape, body: Body, params
     reflections = [] if sides.unflippable(body.opposite) else mirror.reflections(target, shape.matrix)
     done = completion.complete(shape.geometry, reflections)
     if params.symmetrize:
-        plane = (body.armature or body.object).matrix_world
-        done = completion.symmetrised(done, symmetry.opposite_vertices(shape.geometry.positions, plane))
+        to_middle = np.linalg.inv(np.array((body.armature or body.object).matrix_world))
+        across = mesh.transformed(shape.geometry.positions, to_middle)
+        done = completion.symmetrised(done, symmetry.partners(across))
     return done
 
 
@@ -251,6 +107,13 @@ def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], pa
         return False
     binding.check(target, params.make_single_user)
     return True
+
+
+def _wire_distance(geometry: mesh.Geometry, body: Body, params: TransferParams) -> float | None:
+    """Strings have no width that a distance could be a part of: it is one of the source's size."""
+    if len(geometry.triangles) or params.max_distance is not None:
+        return None
+    return params.relative_max_distance * float(np.linalg.norm(body.geometry.size))
 
 
 def _opposite_columns(body: Body) -> NDArray[np.int64]:

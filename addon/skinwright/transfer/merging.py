@@ -46,7 +46,7 @@ def _joined(new: Rows, old: Rows, factor: float, remainder: NDArray[np.float64])
     new_share = np.where(csr.row_sums(new) > 0, factor, 0.0)
     if (new_share == 1).all() or not old.values.size:
         return new
-    return _scaled(_mixed(new, old, new_share, 1 - new_share), remainder)
+    return _scaled(_mixed(new, old, new_share, 1.0 - new_share), remainder)
 
 
 def _beside(new: Rows, old: Rows, chosen: NDArray[np.bool_], factor: float, remainder: NDArray[np.float64]) -> Rows:
@@ -57,7 +57,7 @@ def _beside(new: Rows, old: Rows, chosen: NDArray[np.bool_], factor: float, rema
     sums = np.minimum(csr.row_sums(new), remainder)
     alone = csr.row_sums(others) <= 0
     new = _scaled(new, np.where(alone, remainder, sums))
-    others = _scaled(others, np.where(alone, 0, remainder - sums))
+    others = _scaled(others, np.where(alone, 0.0, remainder - sums))
     return _mixed(new, others, every, every)
 
 

@@ -11,6 +11,8 @@ Groups = Literal["BONE_DEFORM", "BONE_SELECT", "ALL", "ACTIVE"]
 Geometry = Literal["AS_SHOWN", "REST", "CURRENT"]
 SourceScope = Literal["PARTS", "OBJECT", "ARMATURE", "COLLECTION"]
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
+Method = Literal["paper", "confidence"]
+SmallIslands = Literal["auto", "rigid", "solved"]
 Reading = Literal["STEER", "PAINTED"]
 
 
@@ -65,17 +67,43 @@ class TransferParams(Params):
         "AS_SHOWN",
         "Geometry",
         "Which shapes are laid over each other",
+        # Files keep the number of a choice: new ones come last.
         choices={
-            "AS_SHOWN": (
-                "As Shown, in Rest Pose",
-                "The shapes with shape keys and modifiers, but not as they are posed",
-            ),
             "REST": ("Rest", "The shapes without modifiers, shape keys or pose"),
             "CURRENT": (
                 "Current",
                 "The shapes as they are posed and deformed now; what does not follow the pose yet is bound in it",
             ),
+            "AS_SHOWN": (
+                "As Shown, in Rest Pose",
+                "The shapes with shape keys and modifiers, but not as they are posed",
+            ),
         },
+    )
+    method: Method = setting(
+        "paper",
+        "Method",
+        "How vertices take weights from the source",
+        choices={
+            "paper": (
+                "Match or Inpaint",
+                "Copy where distance and angle are within their thresholds, fill in the rest",
+            ),
+            "confidence": ("Confidence", "Trust the weights of each vertex's point less the larger gap and tilt are"),
+        },
+        native=True,
+    )
+    softness: float = setting(
+        0.7,
+        "Softness",
+        "How far weights are smoothed, as a multiple of the gap between garment and source",
+        least=0.05,
+        most=10,
+        soft_least=0.35,
+        soft_most=1.4,
+        precision=2,
+        step=5,
+        native=True,
     )
     max_distance: float | None = setting(
         None,
@@ -90,7 +118,7 @@ class TransferParams(Params):
     relative_max_distance: float = setting(
         0.05,
         "Distance",
-        "Farthest from the source a vertex may match, as a part of the target's bounding-box diagonal",
+        "Farthest from the source a vertex may match, as a part of the target's diagonal or of 30 % of the source's",
         most=10,
         soft_most=0.5,
         precision=3,
@@ -110,6 +138,16 @@ class TransferParams(Params):
     )
     join_borders: bool = setting(
         True, "Join Borders", "Solve targets whose borders lie on each other as one mesh, so that no gap opens there"
+    )
+    relative_weld_tolerance: float = setting(
+        1e-6,
+        "Weld",
+        "Vertices closer than this part of the target's diagonal are one, as at seams of imported files; 0 for none",
+        most=0.1,
+        soft_most=1e-3,
+        precision=6,
+        step=0.01,
+        native=True,
     )
     mask: Mask | None = setting(None, "Mask", "A vertex group that steers the match, for every target the same")
     smoothness_length: float | None = setting(
@@ -141,6 +179,17 @@ class TransferParams(Params):
             "nearest": ("Nearest", "Give each vertex the weights of its closest point on the source"),
             "rigid": ("Rigid", "Give the whole part one set of weights, for buckles and plates"),
             "skip": ("Skip", "Leave the part as it is"),
+        },
+        native=True,
+    )
+    small_islands: SmallIslands = setting(
+        "auto",
+        "Small Parts",
+        "What to do with small loose parts that hang off the source, such as buttons and pouches",
+        choices={
+            "auto": ("Automatic", "Rigid with Confidence, as computed otherwise"),
+            "rigid": ("Rigid", "Give each part one set of weights if it nearly has one"),
+            "solved": ("As Computed", "Leave them as they are computed"),
         },
         native=True,
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from mathutils import Matrix
+from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
@@ -23,7 +24,7 @@ class Plan:
 
     garment: Garment
     result: Result
-    undo: np.ndarray | None
+    undo: NDArray[np.float64] | None
 
 
 def plan(body: Body, garment: Garment, result: Result) -> Plan:
@@ -57,8 +58,8 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
         armature.attach(target, body.object)
     warnings += _smooth(body, target, params)
     bound = planned.undo is not None and bool(armature.rigs(target))
-    if bound:
-        warnings += _bind(garment, planned)
+    if planned.undo is not None and bound:
+        warnings += _bind(garment, planned.undo)
     seconds = {"read": garment.seconds, "compute": result.seconds, "write": time.perf_counter() - start}
     return _report(planned, names, before, attached, bound, seconds, warnings)
 
@@ -90,10 +91,10 @@ def _smooth(body: Body, target: bpy.types.Object, params: TransferParams) -> lis
     ]
 
 
-def _bind(garment: Garment, planned: Plan) -> list[str]:
+def _bind(garment: Garment, undo: NDArray[np.float64]) -> list[str]:
     """Give the target the rest shape that its weights lead from to what is shown."""
     shown = garment.shape.geometry
-    left = binding.bind(garment.object, planned.undo, shown.positions)
+    left = binding.bind(garment.object, undo, shown.positions)
     if left <= 1e-3 * float(np.linalg.norm(shown.size)):
         return []
     return [

@@ -4,6 +4,7 @@ from . import (
     match_panel,
     menus,
     panel,
+    refine_panel,
     result_panel,
     retarget_panel,
     sculpt_panel,
@@ -12,4 +13,15 @@ from . import (
     stored_panel,
 )
 
-MODULES = (panel, session_panel, result_panel, match_panel, sculpt_panel, stored_panel, retarget_panel, menus, show_tab)
+MODULES = (
+    panel,
+    session_panel,
+    result_panel,
+    match_panel,
+    sculpt_panel,
+    stored_panel,
+    retarget_panel,
+    refine_panel,
+    menus,
+    show_tab,
+)

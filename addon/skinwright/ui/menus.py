@@ -1,11 +1,23 @@
 """Entries in Blender's own menus."""
 
-from bpy.types import Context, Menu, VIEW3D_MT_make_links, VIEW3D_MT_paint_weight, VIEW3D_MT_sculpt
+from bpy.types import (
+    Context,
+    Menu,
+    VIEW3D_MT_make_links,
+    VIEW3D_MT_object_parent,
+    VIEW3D_MT_paint_weight,
+    VIEW3D_MT_sculpt,
+)
 
 
 def _transfer_weights(menu: Menu, _context: Context) -> None:
     menu.layout.separator()
     menu.layout.operator("skinwright.transfer_weights", text="Transfer Weights (Skinwright)")
+
+
+def _automatic_weights(menu: Menu, _context: Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator("skinwright.automatic_weights", text="Automatic Weights (Skinwright)")
 
 
 def _paint_weight(menu: Menu, context: Context) -> None:
@@ -19,6 +31,7 @@ def _sculpt_weights(menu: Menu, _context: Context) -> None:
 
 
 ENTRIES = (
+    (VIEW3D_MT_object_parent, _automatic_weights),
     (VIEW3D_MT_paint_weight, _paint_weight),
     (VIEW3D_MT_make_links, _transfer_weights),
     (VIEW3D_MT_sculpt, _sculpt_weights),

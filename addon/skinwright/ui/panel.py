@@ -57,6 +57,7 @@ class SKINWRIGHT_PT_transfer(Tab, Panel):
         if jobs.running:
             layout.progress(factor=jobs.running.progress, text=f"{jobs.running.progress:.0%}, Esc stops")
         layout.operator("skinwright.transfer_weights", icon="MOD_VERTEX_WEIGHT")
+        layout.operator("skinwright.automatic_weights", icon="BONE_DATA")
 
 
 class SKINWRIGHT_PT_transfer_matching(_TransferStep, Panel):

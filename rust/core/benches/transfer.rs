@@ -9,7 +9,7 @@ use divan::Bencher;
 use skinwright_core::adjacency::Topology;
 use skinwright_core::fill::system::{assemble, independent_blocks, number_unknowns};
 use skinwright_core::laplacian::Laplacian;
-use skinwright_core::transfer::{Inpainting, MatchMethod, Settings, Source};
+use skinwright_core::transfer::{Inpainting, Settings, Source, TargetMesh};
 use skinwright_core::{Progress, TriMesh, Weights};
 
 fn main() {
@@ -34,6 +34,10 @@ fn source() -> Source {
     Source::new(&body.positions, body.triangles, weights).unwrap()
 }
 
+fn target_mesh(fixture: &Fixture) -> TargetMesh {
+    TargetMesh { positions: fixture.positions.clone(), triangles: fixture.triangles.clone(), edges: Vec::new() }
+}
+
 #[divan::bench]
 fn laplacian(bencher: Bencher) {
     let garment = garment();
@@ -47,14 +51,7 @@ fn blocks_and_assembly(bencher: Bencher) {
     let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
     let laplacian = Laplacian::new(&mesh, &Topology::new(&garment.triangles, garment.positions.len()));
     let progress = Progress::default();
-    let mut prepared = Inpainting::new(
-        source(),
-        garment.positions.clone(),
-        garment.triangles.clone(),
-        MatchMethod::default(),
-        &progress,
-    )
-    .unwrap();
+    let mut prepared = Inpainting::new(source(), target_mesh(&garment), &Settings::default(), &progress).unwrap();
     let matched = prepared.matched(None, &Settings::default()).unwrap();
     let unknown: Vec<bool> = matched.iter().map(|m| !m).collect();
     bencher.bench_local(|| {
@@ -68,8 +65,7 @@ fn blocks_and_assembly(bencher: Bencher) {
 fn solve_kept(bencher: Bencher, smoothing_iterations: u32) {
     let garment = garment();
     let progress = Progress::default();
-    let mut prepared =
-        Inpainting::new(source(), garment.positions, garment.triangles, MatchMethod::default(), &progress).unwrap();
+    let mut prepared = Inpainting::new(source(), target_mesh(&garment), &Settings::default(), &progress).unwrap();
     let settings = Settings { smoothing_iterations, ..Settings::default() };
     prepared.solve(None, &settings, &progress).unwrap();
     bencher.bench_local(move || prepared.solve(None, &settings, &progress).unwrap());
@@ -79,9 +75,8 @@ fn solve_kept(bencher: Bencher, smoothing_iterations: u32) {
 fn all(bencher: Bencher) {
     let (garment, source, progress) = (garment(), source(), Progress::default());
     bencher.bench_local(|| {
-        let arrays = (garment.positions.clone(), garment.triangles.clone());
         let mut prepared =
-            Inpainting::new(source.clone(), arrays.0, arrays.1, MatchMethod::default(), &progress).unwrap();
+            Inpainting::new(source.clone(), target_mesh(&garment), &Settings::default(), &progress).unwrap();
         prepared.solve(None, &Settings::default(), &progress).unwrap()
     });
 }

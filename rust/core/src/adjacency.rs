@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-/// Marks a vertex that no triangle uses, in every per-vertex index array.
+/// Marks a vertex without triangle or wire, in every per-vertex index array.
 pub const NONE: u32 = u32::MAX;
 
 /// The triangles around each vertex, compressed by vertex, ascending.
@@ -53,33 +53,86 @@ pub struct Topology<'a> {
     pub triangles: Cow<'a, [[u32; 3]]>,
     /// The triangles around each vertex.
     pub around: VertexTriangles,
+    /// Edges that count beside them.
+    pub wires: Wires,
     /// What hangs together.
     pub islands: Islands,
+}
+
+/// Edges that lead to a vertex without a triangle: wires, hair strands, laces.
+#[derive(Debug, Default)]
+pub struct Wires {
+    /// Distinct ones, the lower vertex first, ascending.
+    pub edges: Vec<[u32; 2]>,
+    starts: Vec<u32>,
+    other_ends: Vec<u32>,
+}
+
+impl Wires {
+    /// Those of `edges` (E, 2) of which at least one end is not `used` by a triangle.
+    pub fn new(edges: &[[u32; 2]], used: impl Fn(u32) -> bool, vertex_count: usize) -> Self {
+        let counts = |&&[i, j]: &&[u32; 2]| i != j && !(used(i) && used(j));
+        let mut edges: Vec<[u32; 2]> = edges.iter().filter(counts).map(|&[i, j]| [i.min(j), i.max(j)]).collect();
+        if edges.is_empty() {
+            return Self::default();
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        let mut starts = vec![0u32; vertex_count + 1];
+        edges.as_flattened().iter().for_each(|&i| starts[i as usize + 1] += 1);
+        (0..vertex_count).for_each(|i| starts[i + 1] += starts[i]);
+        let (mut next, mut other_ends) = (starts.clone(), vec![0; 2 * edges.len()]);
+        for &[i, j] in &edges {
+            for (end, other) in [(i, j), (j, i)] {
+                other_ends[next[end as usize] as usize] = other;
+                next[end as usize] += 1;
+            }
+        }
+        Self { edges, starts, other_ends }
+    }
+
+    /// The other ends of the wires at vertex `i`.
+    pub fn around(&self, i: usize) -> &[u32] {
+        match self.starts.get(i..i + 2) {
+            Some(&[start, end]) => &self.other_ends[start as usize..end as usize],
+            _ => &[],
+        }
+    }
 }
 
 impl<'a> Topology<'a> {
     /// Drops triangles that name a vertex twice, and every repetition of the same three vertices (whatever the winding).
     /// Both would put NaN or a doubled stiffness into the Laplacian.
     pub fn new(triangles: &'a [[u32; 3]], vertex_count: usize) -> Self {
+        Self::with_edges(triangles, &[], vertex_count)
+    }
+
+    /// The same with `edges` (E, 2), of which those count that lead to a vertex without a triangle.
+    pub fn with_edges(triangles: &'a [[u32; 3]], edges: &[[u32; 2]], vertex_count: usize) -> Self {
         let repeats_a_vertex = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
         let mut triangles = Cow::Borrowed(triangles);
         if triangles.par_iter().any(repeats_a_vertex) {
             triangles = triangles.iter().filter(|t| !repeats_a_vertex(t)).copied().collect();
         }
+        let mut used = vec![false; if edges.is_empty() { 0 } else { vertex_count }];
+        if !edges.is_empty() {
+            triangles.as_flattened().iter().for_each(|&i| used[i as usize] = true);
+        }
+        let wires = Wires::new(edges, |i| used[i as usize], vertex_count);
         let find_duplicates = || {
             let around = VertexTriangles::new(&triangles, vertex_count);
             (duplicated_triangles(&triangles, &around, vertex_count), around)
         };
         // Duplicates connect nothing that is not connected without them.
         let ((duplicates, mut around), islands) =
-            rayon::join(find_duplicates, || Islands::new(&triangles, vertex_count));
+            rayon::join(find_duplicates, || Islands::with_wires(&triangles, &wires.edges, vertex_count));
         if !duplicates.is_empty() {
             let mut dropped = duplicates.iter().peekable();
             let keep = |&(t, _): &(usize, &[u32; 3])| dropped.next_if(|&&d| d as usize == t).is_none();
             triangles = triangles.iter().enumerate().filter(keep).map(|(_, &corners)| corners).collect();
             around = VertexTriangles::new(&triangles, vertex_count);
         }
-        Self { triangles, around, islands }
+        Self { triangles, around, wires, islands }
     }
 }
 
@@ -102,7 +155,7 @@ fn duplicated_triangles(triangles: &[[u32; 3]], around: &VertexTriangles, vertex
     duplicates
 }
 
-/// The islands (connected components of the face graph) of a mesh, numbered by their smallest vertex.
+/// The islands (connected components of faces and wires) of a mesh, numbered by their smallest vertex.
 #[derive(Debug)]
 pub struct Islands {
     of_vertex: Vec<u32>,
@@ -112,6 +165,11 @@ pub struct Islands {
 impl Islands {
     /// Finds the islands of `triangles` (T, 3) over `vertex_count` vertices.
     pub fn new(triangles: &[[u32; 3]], vertex_count: usize) -> Self {
+        Self::with_wires(triangles, &[], vertex_count)
+    }
+
+    /// The same with `wires` (W, 2).
+    pub fn with_wires(triangles: &[[u32; 3]], wires: &[[u32; 2]], vertex_count: usize) -> Self {
         let mut sets = DisjointSets::new(vertex_count);
         let mut used = vec![false; vertex_count];
         for &[a, b, c] in triangles {
@@ -121,11 +179,15 @@ impl Islands {
                 used[i as usize] = true;
             }
         }
+        for &[i, j] in wires {
+            sets.union(i, j);
+            (used[i as usize], used[j as usize]) = (true, true);
+        }
         let (of_vertex, count) = sets.number(|i| used[i as usize]);
         Self { of_vertex, count }
     }
 
-    /// Island of each vertex (V), [`NONE`] for a vertex that no triangle uses.
+    /// Island of each vertex (V), [`NONE`] for a vertex without triangle or wire.
     pub fn of_vertex(&self) -> &[u32] {
         &self.of_vertex
     }

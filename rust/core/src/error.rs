@@ -32,6 +32,16 @@ pub enum Error {
         /// Number of vertices.
         count: usize,
     },
+    /// An edge that names a vertex which is not there.
+    #[error("edge {edge} of the {what} mesh names a vertex that is not there, there are only {count}")]
+    EdgeOutOfRange {
+        /// Which mesh.
+        what: &'static str,
+        /// First offending edge.
+        edge: usize,
+        /// Number of vertices.
+        count: usize,
+    },
     /// A weight that is NaN or infinite.
     #[error("vertex {vertex} has a weight that is not finite (bone {bone})")]
     WeightNotFinite {

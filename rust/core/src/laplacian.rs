@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::adjacency::{Islands, Topology, VertexTriangles};
+use crate::adjacency::{Islands, NONE, Topology, VertexTriangles, Wires};
 use crate::mesh::TriMesh;
 
 /// Slack that mollification leaves in every triangle inequality, as a share of the island's mean edge.
@@ -35,14 +35,34 @@ impl Laplacian {
     /// A triangle whose inequality holds with less than 1e-5 of its island's mean edge gets its three edge lengths
     /// increased until it does (intrinsic mollification, Sharp & Crane 2020, section 4.5, but per triangle, so that
     /// good triangles keep their cotangents to the bit). No value is ever NaN or infinite, and every mass is positive.
-    pub fn new(mesh: &TriMesh<'_>, Topology { triangles, around, islands }: &Topology<'_>) -> Self {
+    ///
+    /// A wire is a ribbon whose width is the mean length of its island's wires: the stiffness between its ends is width over
+    /// length, and each gets half of its area.
+    pub fn new(mesh: &TriMesh<'_>, topology: &Topology<'_>) -> Self {
+        Self::with_floor(mesh, topology, 0.0)
+    }
+
+    /// The same with a `floor` under what collapsed triangles bring, so that a system with them can be solved: every triangle
+    /// inequality holds with at least this share of the triangle's longest edge, and no mass is less than the floor's square
+    /// times the mean mass of its island.
+    pub fn with_floor(mesh: &TriMesh<'_>, topology: &Topology<'_>, floor: f64) -> Self {
+        let Topology { triangles, around, wires, islands } = topology;
         let slack = island_slack(mesh, triangles, islands);
         let corners: Vec<Corners> = triangles
             .par_iter()
-            .map(|t| Corners::new(t.map(|i| mesh.position(i)), slack[islands.of_vertex()[t[0] as usize] as usize]))
+            .map(|t| {
+                let slack = slack[islands.of_vertex()[t[0] as usize] as usize];
+                Corners::new(t.map(|i| mesh.position(i)), slack, floor)
+            })
             .collect();
+        let least_mass = if floor > 0.0 { least_masses(triangles, &corners, islands, floor) } else { Vec::new() };
         let count = mesh.vertex_count();
-        let run = |k: usize| Rows::new(k * RUN..((k + 1) * RUN).min(count), triangles, around, &corners);
+        let ribbons = Ribbons::new(mesh, wires, islands);
+        let run = |k: usize| {
+            let mut rows = Rows::new(k * RUN..((k + 1) * RUN).min(count), triangles, around, &corners, &ribbons);
+            rows.raise_masses(k * RUN, islands, &least_mass);
+            rows
+        };
         Self { runs: (0..count.div_ceil(RUN)).into_par_iter().map(run).collect() }
     }
 
@@ -61,7 +81,7 @@ impl Laplacian {
         self.runs[i / RUN].diagonal[i % RUN]
     }
 
-    /// Voronoi area of vertex `i`, zero only where no triangle uses it.
+    /// Voronoi area of vertex `i`, zero only where neither triangle nor wire uses it.
     pub fn mass(&self, i: usize) -> f64 {
         self.runs[i / RUN].mass[i % RUN]
     }
@@ -88,12 +108,24 @@ fn island_slack(mesh: &TriMesh<'_>, triangles: &[[u32; 3]], islands: &Islands) -
     sums.into_iter().map(slack).collect()
 }
 
+/// The square of `floor` times the mean mass of each island.
+fn least_masses(triangles: &[[u32; 3]], corners: &[Corners], islands: &Islands, floor: f64) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0usize); islands.count()];
+    for (t, corner) in std::iter::zip(triangles, corners) {
+        sums[islands.of_vertex()[t[0] as usize] as usize].0 += corner.area.iter().sum::<f64>();
+    }
+    for &island in islands.of_vertex().iter().filter(|&&island| island != NONE) {
+        sums[island as usize].1 += 1;
+    }
+    sums.into_iter().map(|(area, count)| floor * floor * area / count as f64).collect()
+}
+
 impl Corners {
-    fn new(positions: [DVec3; 3], slack: f64) -> Self {
+    fn new(positions: [DVec3; 3], slack: f64, floor: f64) -> Self {
         let [a, b, c] = positions;
         let mut lengths = [b.distance(c), c.distance(a), a.distance(b)];
         let longest = lengths.iter().fold(0.0, |m: f64, &x| m.max(x));
-        let missing = slack - (lengths.iter().sum::<f64>() - 2.0 * longest);
+        let missing = slack.max(floor * longest) - (lengths.iter().sum::<f64>() - 2.0 * longest);
         if missing > 0.0 {
             lengths = lengths.map(|x| x + missing);
         }
@@ -123,6 +155,42 @@ fn voronoi_areas(half_cotangent: [f64; 3], squared: [f64; 3], area: f64) -> [f64
     })
 }
 
+/// Wires shorter than this share of their mean count as that long.
+const SHORTEST_WIRE: f64 = 1e-2;
+
+/// What wires add to S and M.
+struct Ribbons<'a> {
+    mesh: &'a TriMesh<'a>,
+    wires: &'a Wires,
+    islands: &'a Islands,
+    /// Mean length of the wires of each island; empty if there are no wires.
+    widths: Vec<f64>,
+}
+
+impl<'a> Ribbons<'a> {
+    fn new(mesh: &'a TriMesh<'a>, wires: &'a Wires, islands: &'a Islands) -> Self {
+        let mut sums = vec![(0.0, 0usize); if wires.edges.is_empty() { 0 } else { islands.count() }];
+        for &[i, j] in &wires.edges {
+            let sum = &mut sums[islands.of_vertex()[i as usize] as usize];
+            (sum.0, sum.1) = (sum.0 + mesh.position(i).distance(mesh.position(j)), sum.1 + 1);
+        }
+        let mean = |(length, count): (f64, usize)| if length > 0.0 { length / count as f64 } else { 1.0 };
+        Self { mesh, wires, islands, widths: sums.into_iter().map(mean).collect() }
+    }
+
+    /// Adds the wires at vertex `i` to its row; the area that they bring.
+    fn add_to(&self, i: usize, entries: &mut Vec<(u32, f64)>) -> f64 {
+        let mut area = 0.0;
+        for &j in self.wires.around(i) {
+            let width = self.widths[self.islands.of_vertex()[i] as usize];
+            let length = self.mesh.position(i as u32).distance(self.mesh.position(j)).max(SHORTEST_WIRE * width);
+            entries.push((j, width / length));
+            area += 0.5 * width * length;
+        }
+        area
+    }
+}
+
 /// The rows of S and M of a run of vertices.
 #[derive(Debug)]
 struct Rows {
@@ -134,7 +202,13 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(vertices: Range<usize>, triangles: &[[u32; 3]], around: &VertexTriangles, corners: &[Corners]) -> Self {
+    fn new(
+        vertices: Range<usize>,
+        triangles: &[[u32; 3]],
+        around: &VertexTriangles,
+        corners: &[Corners],
+        ribbons: &Ribbons<'_>,
+    ) -> Self {
         // One neighbour for each triangle, and one more at a border.
         let likely = vertices.clone().map(|i| around.around(i).len() + 1).sum();
         let mut rows = Self {
@@ -157,10 +231,20 @@ impl Rows {
                 entries.push((triangle[previous], corner.half_cotangent[next]));
                 mass += corner.area[k];
             }
+            mass += ribbons.add_to(i, &mut entries);
             entries.sort_by_key(|&(j, _)| j);
             rows.push(&entries, mass);
         }
         rows
+    }
+
+    /// Raises the masses of the run that starts at vertex `first` to the least of their island, if there is such a thing.
+    fn raise_masses(&mut self, first: usize, islands: &Islands, least: &[f64]) {
+        for (k, mass) in self.mass.iter_mut().enumerate() {
+            if let Some(&least) = least.get(islands.of_vertex()[first + k] as usize) {
+                *mass = mass.max(least);
+            }
+        }
     }
 
     fn push(&mut self, entries: &[(u32, f64)], mass: f64) {

@@ -27,6 +27,11 @@ impl Progress {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
+    /// Set once [`Progress::cancel`] was called.
+    pub(crate) fn stop(&self) -> &AtomicBool {
+        &self.cancelled
+    }
+
     /// `Err(Cancelled)` once [`Progress::cancel`] was called.
     pub fn check(&self) -> Result<()> {
         if self.cancelled.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }

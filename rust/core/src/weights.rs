@@ -132,6 +132,21 @@ impl Weights {
         (&self.bones[range.clone()], &self.values[range])
     }
 
+    /// The rows of these indices, in their order.
+    ///
+    /// Panics if an index is out of range.
+    pub fn take_rows(&self, rows: &[u32]) -> Self {
+        Self::from_rows(
+            rows.len(),
+            self.n_bones,
+            || (),
+            |(), i, out| {
+                let (bones, values) = self.row(rows[i] as usize);
+                out.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, value)));
+            },
+        )
+    }
+
     /// The arrays `(indptr, bones, values)`.
     pub fn into_arrays(self) -> (Vec<u32>, Vec<u32>, Vec<f32>) {
         (self.indptr, self.bones, self.values)

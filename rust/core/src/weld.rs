@@ -71,12 +71,17 @@ impl Weld {
         self.starts[..self.class_count()].iter().map(|&start| self.members[start as usize])
     }
 
-    /// The mesh in which they are one: positions (C, 3) of the representatives, and the triangles (T, 3) over classes, of
-    /// which some may name a vertex twice or repeat others.
+    /// The mesh in which they are one: positions (C, 3) of the representatives, and the triangles (T, 3) over classes, of which
+    /// some may name a vertex twice or repeat others.
     pub fn welded(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         let positions = self.representatives().map(|i| positions[i as usize]).collect();
-        let triangles = triangles.par_iter().with_min_len(4096).map(|t| t.map(|i| self.class_of[i as usize])).collect();
-        (positions, triangles)
+        let class = |i: u32| self.class_of[i as usize];
+        (positions, triangles.par_iter().with_min_len(4096).map(|t| t.map(class)).collect())
+    }
+
+    /// Edges (E, 2) over classes, of which some may name a vertex twice or repeat others.
+    pub fn welded_edges(&self, edges: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        edges.iter().map(|edge| edge.map(|i| self.class_of[i as usize])).collect()
     }
 }
 

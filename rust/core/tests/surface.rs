@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
 use skinwright_core::TriMesh;
-use skinwright_core::surface::{SurfaceIndex, SurfacePoint};
+use skinwright_core::surface::{Bound, Priced, SurfaceIndex, SurfacePoint};
 
 type Point = [i64; 3];
 type Triangle = [u32; 3];
@@ -326,4 +326,55 @@ fn meshes_as_large_as_numbers_go() {
     let mesh = TriMesh::new(&positions, &[[0, 1, 2]], "source").unwrap();
     let answer = SurfaceIndex::new(&mesh).closest_point([0.0; 3]);
     assert!(answer.distance < 1e-9 * f64::from(f32::MAX), "{answer:?}");
+}
+
+// Cheapest points: what adds to the squared distance here is a price per triangle, so that brute force can tell.
+
+fn price(t: u32) -> f64 {
+    f64::from(t.wrapping_mul(2_654_435_761) % 1000) * 2e-4
+}
+
+/// Closest point of one triangle by its own index of one triangle, which the tests above hold against exact arithmetic.
+fn priced_by_brute_force(mesh: &TriMesh<'_>, query: [f32; 3]) -> Vec<(u32, f64, f64)> {
+    let price_of = |t: u32| {
+        let one = SurfaceIndex::of_triangles(mesh, &[t]).expect("one triangle").closest_point(query);
+        (t, one.distance, one.distance * one.distance + price(t))
+    };
+    (0..mesh.triangles().len() as u32).map(price_of).collect()
+}
+
+#[test]
+fn cheapest_points_are_those_of_brute_force() {
+    let wave = |i: u32| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
+    let point = |i: u32| [wave(3 * i), wave(3 * i + 1), wave(3 * i + 2)];
+    let corner = |t: u32, k: u32| std::array::from_fn(|axis| point(t)[axis] + 0.1 * point(7919 * (3 * t + k))[axis]);
+    let positions: Vec<[f32; 3]> = (0..900).map(|i| corner(i / 3, i % 3)).collect();
+    let triangles: Vec<[u32; 3]> = (0..300).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let mesh = TriMesh::new(&positions, &triangles, "source").expect("a sound mesh");
+    let index = SurfaceIndex::new(&mesh);
+    let mut queries: Vec<_> = (0..200).map(|i| point(31 * i + 5)).collect();
+    queries.push([f32::NAN, 0.0, 0.0]);
+    let slack = 1.2;
+    let bounds: Vec<_> =
+        (0..queries.len()).map(|i| Bound { near: 1e-3 * i as f64, cost: 0.05 + 1e-3 * i as f64 }).collect();
+    let cost = |_, p: &SurfacePoint| p.distance * p.distance + price(p.triangle);
+    let finish = |_, found: &[Priced]| found.to_vec();
+    let found = index.cheapest_points(&queries, &bounds, slack, cost, finish);
+    for (i, (query, found)) in std::iter::zip(&queries[..200], &found).enumerate() {
+        let all = priced_by_brute_force(&mesh, *query);
+        let least = all.iter().map(|&(_, _, cost)| cost).fold(f64::INFINITY, f64::min);
+        let counts = |&&(_, distance, cost): &&(u32, f64, f64)| {
+            distance * distance <= bounds[i].near || cost <= bounds[i].cost.min(slack * least)
+        };
+        let expected: Vec<u32> = all.iter().filter(counts).map(|&(t, _, _)| t).collect();
+        assert_eq!(found.iter().map(|p| p.point.triangle).collect::<Vec<_>>(), expected, "query {i}");
+    }
+    assert!(found[200].is_empty());
+    let alone = ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    assert_eq!(alone.install(|| index.cheapest_points(&queries, &bounds, slack, cost, finish)), found);
+    let reversed: Vec<_> = queries.iter().rev().copied().collect();
+    let bounds: Vec<_> = bounds.iter().rev().copied().collect();
+    let mut backwards = index.cheapest_points(&reversed, &bounds, slack, cost, finish);
+    backwards.reverse();
+    assert_eq!(backwards, found);
 }

@@ -1,10 +1,11 @@
-//! Invariants of the transfer over ordinary and degenerate meshes (spec-transfer, section 5).
+//! Invariants of the transfer over ordinary and degenerate meshes.
 
 mod common;
 
 use common::{Fixture, Row, body, button, degenerate, rigid_motion, skirt};
 use skinwright_core::transfer::{
-    Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Source, Transfer, transfer_weights,
+    Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, TargetMesh, Transfer,
+    transfer_weights,
 };
 use skinwright_core::{Error, Progress, Weights};
 
@@ -31,8 +32,11 @@ fn transfer(source: &Source, target: &Fixture, settings: &Settings) -> Transfer 
 }
 
 fn transfer_masked(source: &Source, target: &Fixture, mask: Option<&[MaskValue]>, settings: &Settings) -> Transfer {
-    let arrays = (target.positions.clone(), target.triangles.clone());
-    transfer_weights(source, arrays.0, arrays.1, mask, settings).unwrap_or_else(|e| panic!("{}: {e}", target.name)).1
+    transfer_weights(source, target_mesh(target), mask, settings).unwrap_or_else(|e| panic!("{}: {e}", target.name))
+}
+
+fn target_mesh(fixture: &Fixture) -> TargetMesh {
+    TargetMesh { positions: fixture.positions.clone(), triangles: fixture.triangles.clone(), edges: Vec::new() }
 }
 
 fn dense(weights: &Weights) -> Vec<Vec<f32>> {
@@ -58,9 +62,18 @@ fn every_degenerate_mesh_gets_proper_rows_under_every_policy() {
     let source = source();
     for target in degenerate() {
         for island_policy in IslandPolicy::ALL {
-            for smoothness_length in [Length::Relative(0.05), Length::Absolute(0.0)] {
-                let settings =
-                    Settings { island_policy, smoothness_length, smoothing_iterations: 2, ..Settings::default() };
+            let energies = [Length::Relative(0.05), Length::Absolute(0.0)].map(|l| (MatchMethod::ClosestPoint, l));
+            for (method, smoothness_length) in energies.into_iter().chain([(MatchMethod::Confidence, energies[0].1)]) {
+                let small_islands = SmallIslands::Rigid;
+                let smoothing_iterations = 2;
+                let settings = Settings {
+                    method,
+                    island_policy,
+                    small_islands,
+                    smoothness_length,
+                    smoothing_iterations,
+                    ..Settings::default()
+                };
                 let result = transfer(&source, &target, &settings);
                 assert_eq!(result.weights.vertex_count(), target.positions.len());
                 for i in 0..target.positions.len() {
@@ -215,14 +228,7 @@ fn the_limit_keeps_the_largest_and_renormalises() {
 fn kept_factorisations_give_the_same_answer_as_fresh_ones() {
     let target = skirt();
     let progress = Progress::default();
-    let mut kept = Inpainting::new(
-        source(),
-        target.positions.clone(),
-        target.triangles.clone(),
-        MatchMethod::default(),
-        &progress,
-    )
-    .unwrap();
+    let mut kept = Inpainting::new(source(), target_mesh(&target), &Settings::default(), &progress).unwrap();
     let base = Settings { max_distance: Length::Absolute(0.15), ..Settings::default() };
     assert!(kept.solve(None, &base, &progress).unwrap().report.factored_blocks > 0);
     let smoothed = Settings { smoothing_iterations: 2, max_influences: 2, ..base.clone() };
@@ -257,7 +263,7 @@ fn what_cannot_be_answered_is_a_typed_error() {
     let (fixture, rows) = body();
     let far = skirt().mapped(|p| p + glam::DVec3::X * 50.0);
     let run = |target: &Fixture, settings: &Settings| {
-        transfer_weights(&source(), target.positions.clone(), target.triangles.clone(), None, settings).map(|_| ())
+        transfer_weights(&source(), target_mesh(target), None, settings).map(|_| ())
     };
     let Err(Error::NothingMatched { needed: Some(needed), .. }) = run(&far, &Settings::default()) else {
         panic!("matched at a distance of 50")
@@ -292,10 +298,9 @@ fn a_cancelled_solve_gives_nothing_and_the_next_one_is_whole() {
     let cancelled = Progress::default();
     cancelled.cancel();
     let fresh = Progress::default();
-    let arrays = || (target.positions.clone(), target.triangles.clone());
-    assert!(Inpainting::new(source(), arrays().0, arrays().1, MatchMethod::default(), &cancelled).is_err());
-    let mut kept = Inpainting::new(source(), arrays().0, arrays().1, MatchMethod::default(), &fresh).unwrap();
     let settings = Settings::default();
+    assert!(Inpainting::new(source(), target_mesh(&target), &settings, &cancelled).is_err());
+    let mut kept = Inpainting::new(source(), target_mesh(&target), &settings, &fresh).unwrap();
     assert_eq!(kept.solve(None, &settings, &cancelled).unwrap_err(), Error::Cancelled);
     assert_eq!(kept.solve(None, &settings, &fresh).unwrap().weights, transfer(&source(), &target, &settings).weights);
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use numpy::ndarray::{Dimension, Ix1, Ix2, Ix3};
+use numpy::ndarray::{ArrayView1, Dimension, Ix1, Ix2, Ix3};
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike, PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -43,6 +43,10 @@ impl Number for u32 {
 }
 impl Number for i32 {
     const WHOLE: Option<(f64, f64)> = Some((-2_147_483_648.0, 2_147_483_647.0));
+}
+impl Number for i64 {
+    // As far as a double tells whole numbers apart.
+    const WHOLE: Option<(f64, f64)> = Some((-9_007_199_254_740_992.0, 9_007_199_254_740_992.0));
 }
 
 impl<'py, T: Number, D: Dimension + 'py> FromPyObject<'_, 'py> for Array<'py, T, D>
@@ -86,14 +90,25 @@ fn check_whole(object: &Bound<'_, PyAny>, least: f64, most: f64) -> PyResult<()>
 
 /// Rows of an (N, 3) array; `name` is the argument's.
 pub fn triples<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 3]>> {
-    if array.shape()[1] != 3 {
-        let shape = array.shape();
-        return Err(InvalidParameter::new_err(format!(
-            "{name} must have shape (N, 3), not ({}, {})",
-            shape[0], shape[1]
-        )));
+    rows_of(array, name, |row| [row[0], row[1], row[2]])
+}
+
+/// Rows of an (N, 2) array; `name` is the argument's.
+pub fn pairs<T: Element + Copy>(array: &Matrix<'_, T>, name: &str) -> PyResult<Vec<[T; 2]>> {
+    rows_of(array, name, |row| [row[0], row[1]])
+}
+
+fn rows_of<T: Element, const N: usize>(
+    array: &Matrix<'_, T>,
+    name: &str,
+    row: impl Fn(ArrayView1<'_, T>) -> [T; N],
+) -> PyResult<Vec<[T; N]>> {
+    let shape = array.shape();
+    if shape[1] != N {
+        let (found, columns) = (shape[0], shape[1]);
+        return Err(InvalidParameter::new_err(format!("{name} must have shape (N, {N}), not ({found}, {columns})")));
     }
-    Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+    Ok(array.as_array().rows().into_iter().map(row).collect())
 }
 
 /// Entries of a 1-D array.

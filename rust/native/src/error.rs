@@ -28,6 +28,7 @@ pub fn to_python(error: Error) -> PyErr {
         Error::NoTriangles { .. }
         | Error::PositionNotFinite { .. }
         | Error::VertexOutOfRange { .. }
+        | Error::EdgeOutOfRange { .. }
         | Error::NothingInside
         | Error::TooManyVertices { .. } => InvalidMesh::new_err(sentence),
         Error::WeightNotFinite { .. } | Error::WeightNegative { .. } | Error::InvalidWeights { .. } => {

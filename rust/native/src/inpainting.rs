@@ -6,27 +6,28 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use skinwright_core::Progress;
-use skinwright_core::transfer::{self as core, MatchMethod};
+use skinwright_core::transfer::{self as core, TargetMesh};
 
-use crate::arrays::{Matrix, read_only, triples};
+use crate::arrays::{Matrix, pairs, read_only, triples};
 use crate::error::enter;
 use crate::job::Job;
 use crate::memory;
 use crate::ranges;
 use crate::settings::keywords;
 use crate::source::Source;
-use crate::transfer::{Closest, Transfer};
+use crate::transfer::Transfer;
 use crate::weights::Weights;
 
 /// Unknowns (U,) and their solution (U, n_bones).
 type RawWeights<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<f64>>);
 
-/// A body and a garment prepared for solving again and again: closest points are found once, a block of the system is
-/// factored again only when its own unknowns or the smoothness length change.
+/// A body and a garment prepared for solving again and again, for the settings given: what these do not change is done
+/// once. A block of the system is factored again only when its own unknowns or the smoothness length change.
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Inpainting {
     core: Arc<Mutex<core::Inpainting>>,
-    closest: Arc<Closest>,
+    distance: Py<PyArray1<f32>>,
+    angle: Py<PyArray1<f32>>,
     islands: Py<PyArray1<u32>>,
     n_bones: u32,
     threads: usize,
@@ -43,6 +44,22 @@ impl Inpainting {
     }
 }
 
+/// The target's arrays, if there is memory to prepare them.
+pub(crate) fn target_mesh(
+    positions: &Matrix<'_, f32>,
+    triangles: &Matrix<'_, u32>,
+    edges: Option<&Matrix<'_, u32>>,
+) -> PyResult<TargetMesh> {
+    let target = TargetMesh {
+        positions: triples(positions, "target_positions")?,
+        triangles: triples(triangles, "target_triangles")?,
+        edges: edges.map(|edges| pairs(edges, "target_edges")).transpose()?.unwrap_or_default(),
+    };
+    let faces = target.triangles.len() + target.edges.len();
+    memory::expect("Preparing the target", memory::of_target(target.positions.len(), faces))?;
+    Ok(target)
+}
+
 /// A panic while solving leaves only kept blocks behind, and those are whole: a poisoned lock may be used on.
 fn lock(inpainting: &Mutex<core::Inpainting>) -> MutexGuard<'_, core::Inpainting> {
     inpainting.lock().unwrap_or_else(PoisonError::into_inner)
@@ -57,36 +74,35 @@ pub(crate) fn expect_solve(matched: &[bool]) -> PyResult<()> {
 #[pymethods]
 impl Inpainting {
     #[new]
-    #[pyo3(signature = (source, target_positions, target_triangles, *, threads=0))]
+    #[pyo3(signature = (source, target_positions, target_triangles, *, target_edges=None, threads=0, **settings))]
     fn new(
         py: Python<'_>,
         source: &Source,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
+        target_edges: Option<Matrix<'_, u32>>,
         #[pyo3(from_py_with = ranges::threads)] threads: usize,
+        settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let positions = triples(&target_positions, "target_positions")?;
-        let triangles = triples(&target_triangles, "target_triangles")?;
-        memory::expect("Preparing the target", memory::of_target(positions.len(), triangles.len()))?;
+        let (settings, _) = keywords(settings)?;
+        let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
         let (source, n_bones) = (source.core.clone(), source.core.n_bones());
-        let core = enter(py, threads, || {
-            core::Inpainting::new(source, positions, triangles, MatchMethod::default(), &Progress::default())
-        })?;
-        let closest = Arc::new(Closest::of(py, &core)?);
-        let islands = read_only(py, core.islands().of_vertex().to_vec())?;
-        Ok(Self { core: Arc::new(Mutex::new(core)), closest, islands, n_bones, threads })
+        let core = enter(py, threads, || core::Inpainting::new(source, target, &settings, &Progress::default()))?;
+        let (distance, angle) = (read_only(py, core.distances())?, read_only(py, core.angles())?);
+        let islands = read_only(py, core.island_of_vertex())?;
+        Ok(Self { core: Arc::new(Mutex::new(core)), distance, angle, islands, n_bones, threads })
     }
 
     /// Distance of each vertex to its closest source point (V,), world units.
     #[getter]
     fn distance(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
-        self.closest.distance.clone_ref(py)
+        self.distance.clone_ref(py)
     }
 
     /// Angle between the normals there (V,), radians, NaN where a normal is missing.
     #[getter]
     fn angle(&self, py: Python<'_>) -> Py<PyArray1<f32>> {
-        self.closest.angle.clone_ref(py)
+        self.angle.clone_ref(py)
     }
 
     /// Island of each vertex (V,), 4294967295 for a vertex that no triangle uses.
@@ -95,7 +111,7 @@ impl Inpainting {
         self.islands.clone_ref(py)
     }
 
-    /// Gives the source other weights; nothing geometric is computed anew.
+    /// Gives the source other weights; nothing geometric is computed again.
     fn set_source_weights(&self, py: Python<'_>, weights: &Weights) -> PyResult<()> {
         let weights = weights.to_core(py)?;
         self.enter(py, |inpainting| inpainting.set_source_weights(weights))
@@ -113,6 +129,18 @@ impl Inpainting {
         Ok(PyArray1::from_vec(py, matched))
     }
 
+    /// How far the row that each vertex takes from the source is trusted (V,), 0 to 1; nothing is solved.
+    #[pyo3(signature = (**settings))]
+    fn confidence<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (settings, mask) = keywords(settings)?;
+        let confidence = self.enter(py, |inpainting| inpainting.confidence(mask.as_deref(), &settings))?;
+        Ok(PyArray1::from_vec(py, confidence))
+    }
+
     /// Solves under these settings, factoring only the blocks that changed.
     #[pyo3(signature = (**settings))]
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
@@ -121,7 +149,7 @@ impl Inpainting {
         let solve =
             |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
         let transfer = self.enter(py, solve)?;
-        self.closest.present(py, transfer)
+        Transfer::of(py, transfer)
     }
 
     /// Starts `solve` on threads of its own.
@@ -133,9 +161,9 @@ impl Inpainting {
             let inpainting: &mut core::Inpainting = &mut held;
             expect_solve(&enter(py, self.threads, || inpainting.matched(mask.as_deref(), &settings))?)?;
         }
-        let (core, closest) = (Arc::clone(&self.core), Arc::clone(&self.closest));
+        let core = Arc::clone(&self.core);
         let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
-        Job::start(self.threads, work, move |py, transfer| Ok(Py::new(py, closest.present(py, transfer)?)?.into_any()))
+        Job::start(self.threads, work, |py, transfer| Ok(Py::new(py, Transfer::of(py, transfer)?)?.into_any()))
     }
 
     /// The unknowns (U,) and their solution (U, n_bones) before clamping and normalising, for checks against other

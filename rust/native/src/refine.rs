@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use glam::DAffine3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,7 +11,7 @@ use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, enter, to_python};
+use crate::error::{InvalidParameter, enter};
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
@@ -19,18 +20,18 @@ use crate::weights::Weights;
 #[pyclass(frozen, module = "skinwright_native")]
 pub struct Refiner {
     core: core::Refiner,
-    /// Triangles of the mesh, and the pairs of them that intersect at rest.
-    triangles: Vec<[u32; 3]>,
-    rest_pairs: usize,
     pool: Option<ThreadPool>,
-    report: Mutex<Option<Solved>>,
+    last: Mutex<Option<(Vec<DAffine3>, core::Quality)>>,
 }
 
-/// The last pose solved: figures, and positions for counting pairs when somebody asks.
-struct Solved {
-    report: core::Report,
-    skinned: Vec<[f32; 3]>,
-    refined: Vec<[f32; 3]>,
+impl Refiner {
+    /// Runs `work` with the GIL freed, on the kept pool: starting threads takes longer than a stage of a frame.
+    fn enter<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> PyResult<T> {
+        match &self.pool {
+            Some(pool) => enter(py, 0, || pool.install(work)),
+            None => enter(py, 0, work),
+        }
+    }
 }
 
 #[pymethods]
@@ -60,14 +61,12 @@ impl Refiner {
         let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };
         let build = || {
             let mesh = TriMesh::new(&positions, &triangles, "character")?;
-            let refiner = core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())?;
-            let pairs = core::intersecting_pairs(&positions, &triangles).len();
-            Ok((refiner, pairs))
+            core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())
         };
-        let (core, rest_pairs) = enter(py, threads, build)?;
+        let core = enter(py, threads, build)?;
         let pool = (threads > 0)
             .then(|| ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"));
-        Ok(Self { core, triangles, rest_pairs, pool, report: Mutex::new(None) })
+        Ok(Self { core, pool, last: Mutex::new(None) })
     }
 
     /// Refined positions (V, 3) of a pose (B, 4, 4); `quality` "live" takes few steps, "bake" more.
@@ -82,30 +81,41 @@ impl Refiner {
         let Some(quality) = core::Quality::ALL.into_iter().find(|q| q.name() == quality) else {
             return Err(InvalidParameter::new_err(format!("quality is {quality:?}, but must be \"live\" or \"bake\"")));
         };
-        let solve = || self.core.solve(&pose, quality);
-        let solved = match &self.pool {
-            // The pool is kept: starting threads takes longer than a frame's stage.
-            Some(pool) => enter(py, 0, || pool.install(solve))?,
-            None => enter(py, 0, solve)?,
-        };
-        let skinned = self.core.skinned(&pose).map_err(to_python)?;
-        let (refined, report) = solved;
-        let solved = Solved { report, skinned, refined: refined.clone() };
-        *self.report.lock().unwrap_or_else(PoisonError::into_inner) = Some(solved);
+        let refined = self.enter(py, || self.core.solve(&pose, quality))?;
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some((pose, quality));
         vectors(py, refined)
     }
 
-    /// Figures of the pose solved last; pairs of intersecting triangles are counted here. None before the first.
+    /// Figures of positions (V, 3) that anybody made in a pose (B, 4, 4): "pairs" that intersect, and for each joint that
+    /// turns its "bone", "volume" against rest and "bulge".
+    fn measure(
+        &self,
+        py: Python<'_>,
+        pose_from_rest: Stack<'_, f64>,
+        positions: Matrix<'_, f32>,
+    ) -> PyResult<Py<PyDict>> {
+        let (pose, positions) = (pose(&pose_from_rest)?, triples(&positions, "positions")?);
+        let (pairs, joints) = self.enter(py, || self.core.measure(&pose, &positions))?;
+        let figures = PyDict::new(py);
+        figures.set_item("pairs", pairs)?;
+        let joint = |joint: &core::JointMeasure| {
+            let figures = PyDict::new(py);
+            figures.set_item("bone", joint.bone)?;
+            figures.set_item("volume", joint.volume)?;
+            figures.set_item("bulge", joint.bulge)?;
+            Ok(figures)
+        };
+        figures.set_item("joints", joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?)?;
+        Ok(figures.unbind())
+    }
+
+    /// Figures of the pose solved last, which is solved once more for them. None before the first.
     fn report(&self, py: Python<'_>) -> PyResult<Option<Py<PyDict>>> {
-        let guard = self.report.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(solved) = guard.as_ref() else { return Ok(None) };
-        let count = |positions: &[[f32; 3]]| core::intersecting_pairs(positions, &self.triangles).len();
-        let (before, after) = enter(py, 0, || Ok((count(&solved.skinned), count(&solved.refined))))?;
-        let report = figures(py, &solved.report)?;
-        report.set_item("pairs_at_rest", self.rest_pairs)?;
-        report.set_item("pairs_before", before)?;
-        report.set_item("pairs_after", after)?;
-        Ok(Some(report.unbind()))
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Some((pose, quality)) = last else { return Ok(None) };
+        let solve = || self.core.solve_with_report(&pose, quality, core::projection::Kernel::Lanes);
+        let (_, report) = self.enter(py, solve)?;
+        Ok(Some(figures(py, &report)?.unbind()))
     }
 }
 
@@ -132,6 +142,9 @@ fn figures<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'py, P
         Ok(figures)
     };
     figures.set_item("joints", report.joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?)?;
+    figures.set_item("pairs_at_rest", report.pairs_at_rest)?;
+    figures.set_item("pairs_before", report.pairs_before)?;
+    figures.set_item("pairs_after", report.pairs_after)?;
     figures.set_item("active_tetrahedra", report.active_tetrahedra)?;
     figures.set_item("inverted_tetrahedra", report.inverted_tetrahedra)?;
     figures.set_item("tetrahedra", report.tetrahedra)?;

@@ -5,15 +5,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use skinwright_core::Progress;
-use skinwright_core::transfer::{self as core, MatchMethod};
+use skinwright_core::transfer as core;
 
 use crate::arrays::{Matrix, triples};
 use crate::error::enter;
-use crate::inpainting::expect_solve;
+use crate::inpainting::{expect_solve, target_mesh};
 use crate::memory;
 use crate::ranges;
 use crate::settings::keywords;
-use crate::transfer::{Closest, Transfer};
+use crate::transfer::Transfer;
 use crate::weights::Weights;
 
 /// Triangles (Q,), barycentric coordinates (Q, 3) and distances (Q,).
@@ -63,40 +63,37 @@ impl Source {
     }
 
     /// Transfers this body's weights to one garment. The settings are those of `transfer_weights`.
-    #[pyo3(signature = (target_positions, target_triangles, *, threads=0, **settings))]
+    #[pyo3(signature = (target_positions, target_triangles, *, target_edges=None, threads=0, **settings))]
     fn transfer(
         &self,
         py: Python<'_>,
         target_positions: Matrix<'_, f32>,
         target_triangles: Matrix<'_, u32>,
+        target_edges: Option<Matrix<'_, u32>>,
         #[pyo3(from_py_with = ranges::threads)] threads: usize,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
-        let positions = triples(&target_positions, "target_positions")?;
-        let triangles = triples(&target_triangles, "target_triangles")?;
-        memory::expect("Preparing the target", memory::of_target(positions.len(), triangles.len()))?;
+        let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
         let (progress, mask) = (Progress::default(), mask.as_deref());
         let (mut inpainting, matched) = enter(py, threads, || {
-            let (source, method) = (self.core.clone(), MatchMethod::default());
-            let mut inpainting = core::Inpainting::new(source, positions, triangles, method, &progress)?;
+            let mut inpainting = core::Inpainting::new(self.core.clone(), target, &settings, &progress)?;
             let matched = inpainting.matched(mask, &settings)?;
             Ok((inpainting, matched))
         })?;
         expect_solve(&matched)?;
-        let transfer = enter(py, threads, || inpainting.solve(mask, &settings, &progress))?;
-        Closest::of(py, &inpainting)?.present(py, transfer)
+        Transfer::of(py, enter(py, threads, || inpainting.solve(mask, &settings, &progress))?)
     }
 }
 
 /// Transfers skin weights from a source mesh to a target mesh by weight inpainting, once.
 #[pyfunction]
 #[pyo3(signature = (source_positions, source_triangles, source_weights, target_positions, target_triangles, *,
-    threads=0, **settings),
+    target_edges=None, threads=0, **settings),
     text_signature = "(source_positions, source_triangles, source_weights, target_positions, target_triangles, *, \
-    max_distance=None, relative_max_distance=0.05, max_normal_angle=0.6108652381980153, match_flipped_normals=True, \
-    mask=None, smoothness_length=None, relative_smoothness_length=0.05, smoothing_iterations=0, \
-    smoothing_factor=0.2, max_influences=0, island_policy='bridge', threads=0)")]
+    target_edges=None, method='paper', softness=0.7, max_distance=None, relative_max_distance=0.05, max_normal_angle=0.6108652381980153, match_flipped_normals=True, \
+    mask=None, relative_weld_tolerance=1e-06, smoothness_length=None, relative_smoothness_length=0.05, smoothing_iterations=0, \
+    smoothing_factor=0.2, max_influences=0, island_policy='bridge', small_islands='auto', threads=0)")]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
 pub fn transfer_weights(
     py: Python<'_>,
@@ -105,9 +102,10 @@ pub fn transfer_weights(
     source_weights: &Weights,
     target_positions: Matrix<'_, f32>,
     target_triangles: Matrix<'_, u32>,
+    target_edges: Option<Matrix<'_, u32>>,
     #[pyo3(from_py_with = ranges::threads)] threads: usize,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Transfer> {
     let source = Source::new(py, source_positions, source_triangles, source_weights, threads)?;
-    source.transfer(py, target_positions, target_triangles, threads, settings)
+    source.transfer(py, target_positions, target_triangles, target_edges, threads, settings)
 }

@@ -1,4 +1,4 @@
-//! What a transfer gives back to Python.
+//! What a transfer returns to Python.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -9,37 +9,28 @@ use crate::arrays::read_only;
 use crate::settings::policy_name;
 use crate::weights::Weights;
 
-/// What a transfer gives back; every array has one entry a target vertex.
+/// What a transfer returns; every array has one entry per target vertex.
 #[pyclass(frozen, get_all, module = "skinwright_native")]
 pub struct Transfer {
     weights: Py<Weights>,
     matched: Py<PyArray1<bool>>,
+    confidence: Py<PyArray1<f32>>,
     distance: Py<PyArray1<f32>>,
     angle: Py<PyArray1<f32>>,
     raw_minimum: f64,
     report: Py<PyDict>,
 }
 
-/// Distance and angle of every vertex, shared by all results of one target.
-pub(crate) struct Closest {
-    pub(crate) distance: Py<PyArray1<f32>>,
-    pub(crate) angle: Py<PyArray1<f32>>,
-}
-
-impl Closest {
-    pub(crate) fn of(py: Python<'_>, inpainting: &core::Inpainting) -> PyResult<Self> {
-        let distance = inpainting.points().iter().map(|point| point.distance as f32).collect();
-        Ok(Self { distance: read_only(py, distance)?, angle: read_only(py, inpainting.angles().to_vec())? })
-    }
-
-    pub(crate) fn present(&self, py: Python<'_>, transfer: core::Transfer) -> PyResult<Transfer> {
-        Ok(Transfer {
-            weights: Py::new(py, Weights::from_core(py, transfer.weights)?)?,
-            matched: read_only(py, transfer.matched)?,
-            distance: self.distance.clone_ref(py),
-            angle: self.angle.clone_ref(py),
+impl Transfer {
+    pub(crate) fn of(py: Python<'_>, transfer: core::Transfer) -> PyResult<Self> {
+        Ok(Self {
             raw_minimum: transfer.report.raw_minimum,
             report: report_dict(py, &transfer.report)?.unbind(),
+            weights: Py::new(py, Weights::from_core(py, transfer.weights)?)?,
+            matched: read_only(py, transfer.matched)?,
+            confidence: read_only(py, transfer.confidence)?,
+            distance: read_only(py, transfer.distances)?,
+            angle: read_only(py, transfer.angles)?,
         })
     }
 }
@@ -50,6 +41,7 @@ fn report_dict<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'p
     dict.set_item("matched", report.matched)?;
     dict.set_item("inpainted", report.inpainted)?;
     dict.set_item("loose", report.loose)?;
+    dict.set_item("welded", report.welded)?;
     dict.set_item("unweighted", report.unweighted)?;
     dict.set_item("islands", report.islands)?;
     let unmatched = PyList::empty(py);
@@ -61,6 +53,7 @@ fn report_dict<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'p
         unmatched.append(entry)?;
     }
     dict.set_item("unmatched_islands", unmatched)?;
+    dict.set_item("rigid_islands", report.rigid_islands)?;
     dict.set_item("blocks", report.blocks)?;
     dict.set_item("factored_blocks", report.factored_blocks)?;
     dict.set_item("bones_used", report.bones_used)?;

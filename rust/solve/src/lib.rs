@@ -27,7 +27,8 @@ mod ordering;
 mod substitute;
 mod supernodal;
 
-use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
@@ -66,6 +67,18 @@ pub struct NotPositive {
     pub unknown: usize,
 }
 
+/// Why there is no factorisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Failure {
+    /// The matrix is not positive definite.
+    NotPositive(NotPositive),
+    /// The caller asked to stop.
+    Stopped,
+}
+
+/// For work that nobody stops.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 /// A pivot at or below this is zero but for rounding, `diagonal` being the entry it started from. Singular matrices leave
 /// up to 5e-13 of it, inpainting energies of a million sound vertices no less than 1e-9.
 fn pivot_floor(diagonal: f64) -> f64 {
@@ -84,6 +97,11 @@ pub enum Method {
 impl Method {
     /// Every method.
     pub const ALL: [Self; 2] = [Self::Multifrontal, Self::Supernodal];
+
+    /// The one that suits the size of a matrix.
+    fn of(matrix: &SymmetricMatrix) -> Self {
+        if matrix.size() < FEW { Self::Supernodal } else { Self::Multifrontal }
+    }
 }
 
 /// Matrices smaller than this are ordered so fast by minimum degree that fronts do not pay.
@@ -99,7 +117,7 @@ const SOUND: f64 = 1e-12;
 #[derive(Debug)]
 pub struct Cholesky {
     /// Kept to measure residuals: a tenth of the factor's size.
-    matrix: SymmetricMatrix,
+    matrix: Arc<SymmetricMatrix>,
     factor: Factor,
     /// What solves when the factor cannot.
     substitute: OnceLock<Option<Factor>>,
@@ -119,8 +137,17 @@ impl Cholesky {
     /// # Errors
     /// [`NotPositive`] with the offending unknown.
     pub fn factor(matrix: SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
-        let method = if matrix.size() < FEW { Method::Supernodal } else { Method::Multifrontal };
-        Self::factor_with(method, matrix, positions)
+        Self::factor_with(Method::of(&matrix), matrix, positions)
+    }
+
+    /// The same, unless `stop` is set meanwhile: it is heard within about a tenth of a second.
+    ///
+    /// # Errors
+    /// [`Failure::NotPositive`], [`Failure::Stopped`].
+    pub fn factor_until(matrix: SymmetricMatrix, positions: &[Vec3], stop: &AtomicBool) -> Result<Self, Failure> {
+        let matrix = Arc::new(matrix);
+        let factor = Factor::new(Method::of(&matrix), &matrix, positions, stop)?;
+        Ok(Self { matrix, factor, substitute: OnceLock::new() })
     }
 
     /// The same with a method of choice. Where separators turn out large, `Multifrontal` gives way to `Supernodal`.
@@ -128,8 +155,12 @@ impl Cholesky {
     /// # Errors
     /// [`NotPositive`] with the offending unknown.
     pub fn factor_with(method: Method, matrix: SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
-        let factor = Factor::new(method, &matrix, positions)?;
-        Ok(Self { matrix, factor, substitute: OnceLock::new() })
+        let matrix = Arc::new(matrix);
+        match Factor::new(method, &matrix, positions, &NEVER) {
+            Ok(factor) => Ok(Self { matrix, factor, substitute: OnceLock::new() }),
+            Err(Failure::NotPositive(failed)) => Err(failed),
+            Err(Failure::Stopped) => unreachable!("nobody stops it"),
+        }
     }
 
     /// Solves for all right-hand sides. The solution is measured, refined where it needs to be, and sought with the other
@@ -139,7 +170,7 @@ impl Cholesky {
         if solution.residual <= SOUND || !matches!(self.factor, Factor::Multifrontal(_)) {
             return solution;
         }
-        let substitute = || Factor::new(Method::Supernodal, &self.matrix, &[]).ok();
+        let substitute = || Factor::new(Method::Supernodal, &self.matrix, &[], &NEVER).ok();
         match self.substitute.get_or_init(substitute) {
             Some(substitute) => self.solve_with(substitute, rhs),
             None => solution,
@@ -176,16 +207,21 @@ impl Cholesky {
 }
 
 impl Factor {
-    fn new(method: Method, matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Self, NotPositive> {
+    fn new(
+        method: Method,
+        matrix: &Arc<SymmetricMatrix>,
+        positions: &[Vec3],
+        stop: &AtomicBool,
+    ) -> Result<Self, Failure> {
         if matrix.size() == 0 {
             return Ok(Self::Empty);
         }
         if method == Method::Multifrontal
-            && let Some(factor) = Multifrontal::factor(matrix, positions)?
+            && let Some(factor) = Multifrontal::factor(matrix, positions, stop)?
         {
             return Ok(Self::Multifrontal(Box::new(factor)));
         }
-        Ok(Self::Supernodal(Box::new(Supernodal::factor(matrix)?)))
+        Ok(Self::Supernodal(Box::new(Supernodal::factor_until(matrix, stop)?)))
     }
 
     fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {

@@ -1,5 +1,10 @@
 //! faer's left-looking supernodal Cholesky under approximate minimum degree: for graphs that are no surface, and the oracle.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -12,7 +17,7 @@ use faer::{Conj, MatMut, Par, Side};
 
 use crate::fronts::buffer::Buffer;
 use crate::substitute::solution::{Part, RightHandSides, Solution};
-use crate::{NotPositive, SymmetricMatrix, pivot_floor};
+use crate::{Failure, NotPositive, SymmetricMatrix, pivot_floor};
 
 /// A factorisation by supernodes.
 #[derive(Debug)]
@@ -21,7 +26,34 @@ pub(crate) struct Supernodal {
     values: Vec<f64>,
 }
 
+/// Matrices smaller than this are factored before anybody could want to stop.
+const QUICK: usize = 2000;
+/// How often a request to stop is looked at.
+const LOOK: Duration = Duration::from_millis(20);
+
 impl Supernodal {
+    /// The same as [`Self::factor`], unless `stop` is set meanwhile. faer has no way to stop, so a thread of its own does the
+    /// work and, once nobody waits for it any more, ends it in the background.
+    pub(crate) fn factor_until(matrix: &Arc<SymmetricMatrix>, stop: &AtomicBool) -> Result<Self, Failure> {
+        if matrix.size() < QUICK {
+            return Self::factor(matrix).map_err(Failure::NotPositive);
+        }
+        let (sender, receiver) = channel();
+        let matrix = Arc::clone(matrix);
+        let worker = std::thread::spawn(move || drop(sender.send(Self::factor(&matrix))));
+        loop {
+            match receiver.recv_timeout(LOOK) {
+                Ok(outcome) => return outcome.map_err(Failure::NotPositive),
+                Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => return Err(Failure::Stopped),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => match worker.join() {
+                    Err(panic) => std::panic::resume_unwind(panic),
+                    Ok(()) => unreachable!("it sends before it ends"),
+                },
+            }
+        }
+    }
+
     /// Orders, analyses and factors `matrix`, which must not be empty.
     pub(crate) fn factor(matrix: &SymmetricMatrix) -> Result<Self, NotPositive> {
         let n = matrix.size();

@@ -41,6 +41,7 @@ class SessionOperator(Operator):
     def _begun(self, context: Context) -> BrushSession | None:
         try:
             session = self.make(context)
+            keeping.keep_before([session.target()], session.label)
         except Refused as error:
             self._tell([Message("ERROR", str(error))])
             return None

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::block::{Block, BlockRows, System};
 use super::constraint::Known;
-use super::rows::KnownRows;
+use super::rows::{GivenRows, KnownRows};
 use super::system::{independent_blocks, number_unknowns};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
 use crate::progress::Progress;
 
@@ -42,20 +42,46 @@ impl Blocks {
         missing.into_par_iter().map(assemble).collect()
     }
 
-    /// Factors what was missing and keeps it.
-    pub(super) fn factor(&mut self, positions: &[[f32; 3]], missing: Vec<System>, progress: &Progress) -> Result<()> {
-        let factor = |system| {
+    /// Factors what was missing and keeps it. Returns the unknowns of blocks that are not positive definite.
+    pub(super) fn factor(
+        &mut self,
+        positions: &[[f32; 3]],
+        missing: Vec<System>,
+        progress: &Progress,
+    ) -> Result<Vec<Vec<u32>>> {
+        let factor = |system: System| {
             progress.check()?;
-            Block::new(positions, system)
+            let unknowns = system.unknowns().to_vec();
+            match Block::new(positions, system, progress) {
+                Ok(block) => Ok(Ok(block)),
+                Err(Error::NotPositiveDefinite { .. }) => Ok(Err(unknowns)),
+                Err(error) => Err(error),
+            }
         };
-        let fresh: Result<Vec<Block>> = missing.into_par_iter().map(factor).collect();
-        self.0.extend(fresh?);
+        let outcomes: Vec<_> = missing.into_par_iter().map(factor).collect::<Result<_>>()?;
+        let mut failed = Vec::new();
+        for outcome in outcomes {
+            match outcome {
+                Ok(block) => self.0.push(block),
+                Err(unknowns) => failed.push(unknowns),
+            }
+        }
         self.0.sort_by_key(|block| block.unknowns()[0]);
-        Ok(())
+        Ok(failed)
     }
 
     /// Solves all blocks.
     pub(super) fn solve(&self, known: KnownRows<'_>, progress: &Progress) -> Result<Vec<BlockRows<'_>>> {
         self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve(known))).collect()
+    }
+
+    /// Solves all blocks twice, see [`Block::solve_twice`].
+    pub(super) fn solve_twice(
+        &self,
+        known: KnownRows<'_>,
+        added: GivenRows<'_>,
+        progress: &Progress,
+    ) -> Result<Vec<BlockRows<'_>>> {
+        self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve_twice(known, added))).collect()
     }
 }

@@ -21,7 +21,9 @@ pub use constraint::Constraint;
 pub use filled::Filled;
 pub use rows::{GivenRows, Row};
 
-use crate::adjacency::{Islands, Topology};
+use std::borrow::Cow;
+
+use crate::adjacency::{Islands, NONE, Topology};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
 use crate::mesh::TriMesh;
@@ -31,6 +33,11 @@ use block::System;
 use blocks::Blocks;
 use constraint::Known;
 use rows::KnownRows;
+use system::number_unknowns;
+
+/// Floors for what cannot be solved without, one after the other (see [`Laplacian::with_floor`]).
+const FLOORS: [f64; 3] = [1e-4, 1e-3, LAST_FLOOR];
+const LAST_FLOOR: f64 = 1e-2;
 
 /// A mesh prepared for filling: topology, Laplacian and the factorisations of the problem posed last.
 #[derive(Debug)]
@@ -40,6 +47,11 @@ pub struct Fill {
     positions: Vec<[f32; 3]>,
     /// Without repeated vertices and duplicates.
     triangles: Vec<[u32; 3]>,
+    /// With them, if there were any.
+    all_triangles: Option<Vec<[u32; 3]>>,
+    edges: Vec<[u32; 2]>,
+    /// Distinct edges to vertices without a triangle.
+    wires: Vec<[u32; 2]>,
     islands: Islands,
     laplacian: Laplacian,
     blocks: Blocks,
@@ -51,6 +63,7 @@ pub struct Fill {
 #[must_use = "nothing is factored yet"]
 pub struct Assembled {
     known: Known,
+    length: f64,
     missing: Vec<System>,
 }
 
@@ -69,25 +82,76 @@ impl Fill {
     /// # Errors
     /// Those of [`TriMesh::new`]; [`Error::LengthMismatch`] if `weld` is for another number of vertices.
     pub fn new(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, weld: Option<Weld>) -> Result<Self> {
+        Self::with_edges(positions, triangles, Vec::new(), weld)
+    }
+
+    /// The same with `edges` (E, 2), of which those count that lead to a vertex without a triangle: a wire is a ribbon as wide
+    /// as the wires of its island are long on average. There may be edges only.
+    ///
+    /// # Errors
+    /// Those of [`Fill::new`]; [`Error::EdgeOutOfRange`].
+    pub fn with_edges(
+        positions: Vec<[f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+        edges: Vec<[u32; 2]>,
+        weld: Option<Weld>,
+    ) -> Result<Self> {
         let vertex_count = positions.len();
-        TriMesh::new(&positions, &triangles, "target")?;
-        let (positions, triangles) = match &weld {
-            None => (positions, triangles),
+        TriMesh::with_edges(&positions, &triangles, &edges, "target")?;
+        let (positions, triangles, edges) = match &weld {
+            None => (positions, triangles, edges),
             Some(weld) => {
                 let found = weld.class_of().len();
                 if found != vertex_count {
                     return Err(Error::LengthMismatch { what: "weld", found, expected: vertex_count });
                 }
-                weld.welded(&positions, &triangles)
+                let (positions, triangles) = weld.welded(&positions, &triangles);
+                (positions, triangles, weld.welded_edges(&edges))
             }
         };
         let mesh = TriMesh::of_checked(&positions, &triangles);
-        let topology = Topology::new(&triangles, positions.len());
+        let topology = Topology::with_edges(&triangles, &edges, positions.len());
         let laplacian = Laplacian::new(&mesh, &topology);
-        let Topology { triangles: clean, islands, .. } = topology;
-        let triangles = if clean.len() == triangles.len() { triangles } else { clean.into_owned() };
-        let (blocks, known) = (Blocks::default(), Known::default());
-        Ok(Self { weld, vertex_count, positions, triangles, islands, laplacian, blocks, known })
+        let Topology { triangles: clean, islands, wires, .. } = topology;
+        let (triangles, all_triangles) =
+            if clean.len() == triangles.len() { (triangles, None) } else { (clean.into_owned(), Some(triangles)) };
+        let (wires, blocks, known) = (wires.edges, Blocks::default(), Known::default());
+        Ok(Self {
+            weld,
+            vertex_count,
+            positions,
+            triangles,
+            all_triangles,
+            edges,
+            wires,
+            islands,
+            laplacian,
+            blocks,
+            known,
+        })
+    }
+
+    /// The mesh that is solved on with all of its triangles and edges: positions, (T, 3), (E, 2).
+    pub fn arrays(&self) -> (&[[f32; 3]], &[[u32; 3]], &[[u32; 2]]) {
+        (&self.positions, self.all_triangles.as_ref().unwrap_or(&self.triangles), &self.edges)
+    }
+
+    /// The triangles of [`Fill::mesh`], and after them each wire as one that names its second vertex twice.
+    pub fn triangles_and_wires(&self) -> Cow<'_, [[u32; 3]]> {
+        if self.wires.is_empty() {
+            return Cow::Borrowed(&self.triangles);
+        }
+        self.triangles.iter().copied().chain(self.wires.iter().map(|&[i, j]| [i, j, j])).collect()
+    }
+
+    /// Whether a vertex of the mesh that is solved on has wires but no triangle.
+    pub fn is_wire(&self) -> Vec<bool> {
+        if self.wires.is_empty() {
+            return vec![false; self.positions.len()];
+        }
+        let mut is_wire: Vec<bool> = self.islands.of_vertex().iter().map(|&island| island != NONE).collect();
+        self.triangles.as_flattened().iter().for_each(|&i| is_wire[i as usize] = false);
+        is_wire
     }
 
     /// The mesh that is solved on: welded, without triangles that name a vertex twice or repeat another.
@@ -125,16 +189,36 @@ impl Fill {
         }
         let known = Known::new(constraints, self.weld.as_ref(), &self.islands)?;
         let missing = self.blocks.assemble_missing(&self.laplacian, &known, length, progress)?;
-        Ok(Assembled { known, missing })
+        Ok(Assembled { known, length, missing })
     }
 
     /// Factors the blocks that were missing; they are kept until a problem has no use for them.
     ///
+    /// A block that collapsed triangles make singular is assembled again with floors under lengths and masses, and in the
+    /// end without the second term of the energy.
+    ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`], [`Error::Cancelled`]; the blocks that were there before stay usable.
     pub fn factor(&mut self, assembled: Assembled, progress: &Progress) -> Result<()> {
-        self.blocks.factor(&self.positions, assembled.missing, progress)?;
-        self.known = assembled.known;
+        let Assembled { known, length, missing } = assembled;
+        let mut failed = self.blocks.factor(&self.positions, missing, progress)?;
+        for (floor, used_length) in FLOORS.map(|floor| (floor, length)).into_iter().chain([(LAST_FLOOR, 0.0)]) {
+            if failed.is_empty() {
+                break;
+            }
+            let mesh = TriMesh::of_checked(&self.positions, &self.triangles);
+            let topology = Topology::with_edges(&self.triangles, &self.edges, self.positions.len());
+            let laplacian = Laplacian::with_floor(&mesh, &topology, floor);
+            let number = number_unknowns(&failed, self.positions.len());
+            let system =
+                |unknowns| System::new(&laplacian, &known, unknowns, &number, used_length).standing_for(length);
+            let systems = failed.into_iter().map(system).collect();
+            failed = self.blocks.factor(&self.positions, systems, progress)?;
+        }
+        if let Some(unknowns) = failed.first() {
+            return Err(Error::NotPositiveDefinite { vertex: unknowns[0] as usize });
+        }
+        self.known = known;
         Ok(())
     }
 
@@ -150,6 +234,23 @@ impl Fill {
     pub fn solve<'a>(&'a self, given: GivenRows<'a>, progress: &Progress) -> Result<Filled<'a>> {
         let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
         let rows = self.blocks.solve(known, progress)?;
+        Ok(Filled::new(known, self.blocks.as_slice(), rows))
+    }
+
+    /// Solves the problem posed last twice with one factor: soft rows are pulled towards the `given` ones first and towards
+    /// that answer then. With l = 0 this is as smooth as l > 0 makes it, at the price of a much smaller factor. Both times
+    /// the rows of `added`, by vertex of the mesh that is solved on, come on top of what soft rows are pulled to.
+    ///
+    /// # Errors
+    /// Those of [`Fill::solve`].
+    pub fn solve_twice<'a>(
+        &'a self,
+        given: GivenRows<'a>,
+        added: GivenRows<'_>,
+        progress: &Progress,
+    ) -> Result<Filled<'a>> {
+        let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
+        let rows = self.blocks.solve_twice(known, added, progress)?;
         Ok(Filled::new(known, self.blocks.as_slice(), rows))
     }
 }

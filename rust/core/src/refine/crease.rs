@@ -11,11 +11,14 @@ use super::local::Local;
 
 /// Skin within this many radii of a contact belongs to the membrane. A distance, not a number of edges: rings of a coarse
 /// limb cost it a seventh of its volume.
-const WIDTH: f32 = 0.3;
+const WIDTH: f32 = 0.4;
 /// How far a pass moves the membrane towards the mean of its neighbours.
 const SMOOTHING: f32 = 0.5;
-/// In contact is what has come this near to the plane, in radii.
-const TOUCH: f32 = 4e-4;
+/// Edges up to this many radii are short.
+const FINE: f32 = 0.4;
+/// In contact is what has come this near to the plane, in radii: the lattice holds skin off the plane, and folds start
+/// before it is there.
+const TOUCH: f32 = 0.2;
 
 /// One bent joint in one step.
 #[derive(Debug, Clone, Copy)]
@@ -30,10 +33,18 @@ pub(super) struct Crease<'a> {
 impl Crease<'_> {
     /// Puts lattice and skin back on their own sides.
     pub(super) fn separate(&self, local: &mut Local) {
-        for member in self.members.iter().filter(|member| member.side != 0.0) {
+        let nodes = local.nodes;
+        for member in self.members {
             let particle = &mut local.particles[member.particle as usize];
-            let by = self_collision(&self.plane, place(particle), member.side);
-            shift(particle, by);
+            if member.side != 0.0 {
+                let by = self_collision(&self.plane, place(particle), member.side);
+                shift(particle, by);
+            } else if member.particle as usize >= nodes {
+                // Skin that lies in the plane at rest stays between the two sides.
+                let height = (place(particle) - self.plane.origin).dot(self.plane.normal);
+                let within = height.clamp(-self.plane.gap / 2.0, self.plane.gap / 2.0);
+                shift(particle, self.plane.normal * (within - height));
+            }
         }
     }
 
@@ -43,11 +54,20 @@ impl Crease<'_> {
         let touches = |m: &&Member| {
             let at = place(&local.particles[m.particle as usize]);
             local.is_surface(m.particle)
-                && m.side != 0.0
                 && self.plane.depth(at, m.side) < within
                 && (at - self.axis.origin).dot(inwards) > 0.0
         };
         self.members.iter().filter(touches).map(|member| member.particle).collect()
+    }
+
+    /// 1 where edges are short beside the limb's radius; less where they are long, as each pass of smoothing then takes a
+    /// larger part of the limb away.
+    fn fineness(&self, local: &Local, rest: &[Vec3], vertices: &[u32]) -> f32 {
+        let place = |p: u32| rest[local.global[p as usize] as usize];
+        let lengths = vertices.iter().flat_map(|&p| local.ring(p).iter().map(move |&n| place(p).distance(place(n))));
+        let (sum, count) = lengths.fold((0.0, 0), |(sum, count), length| (sum + length, count + 1));
+        let edge = sum / count.max(1) as f32;
+        (FINE * self.radius / edge.max(1e-6)).powi(2).min(1.0)
     }
 
     /// Passes of the membrane: towards the neighbours' mean, then back to the own side.
@@ -58,7 +78,7 @@ impl Crease<'_> {
                 return;
             }
             let near = within(local, rest, &contacts, WIDTH * self.radius);
-            smooth(local, &near, SMOOTHING);
+            smooth(local, &near, SMOOTHING * self.fineness(local, rest, &contacts));
             self.separate(local);
         }
     }

@@ -11,7 +11,7 @@ const LEAST_ANGLE: f64 = 5.0;
 /// Beyond this bend a limb's sides meet along all of it; the reach grows no further.
 const MOST_BEND: f32 = 2.5;
 /// What a joint's region reaches beyond the crease, in radii.
-const MARGIN: f32 = 0.8;
+const MARGIN: f32 = 1.2;
 /// Gap on each side of the plane, in radii, for a joint that has turned by a right angle or more.
 const GAP: f32 = 0.016;
 
@@ -63,15 +63,16 @@ impl ActiveJoint<'_> {
         self.joint.members.iter().filter(|member| member.along < self.reach)
     }
 
-    /// The particles beyond, for as far again.
+    /// The particles beyond, for twice as far again.
     pub(super) fn beyond(&self) -> impl Iterator<Item = &Member> {
-        self.joint.members.iter().filter(|member| (self.reach..2.0 * self.reach).contains(&member.along))
+        self.joint.members.iter().filter(|member| (self.reach..3.0 * self.reach).contains(&member.along))
     }
 
     /// Nearest and farthest that a particle beyond the free ones may be from the bones: what skinning says matters more
     /// the farther it is.
     pub(super) fn bounds_beyond(&self, member: &Member) -> (f32, f32) {
-        let away = (member.along / self.reach - 1.0).clamp(0.0, 1.0);
-        (member.distance * (0.98 - 0.98 * away), member.distance * (1.02 + away))
+        let away = (member.along / self.reach - 1.0).clamp(0.0, 2.0);
+        let farther = (away - 1.0).max(0.0);
+        (member.distance * (0.98 - 0.49 * away), member.distance * (1.02 + 0.06 * away.min(1.0) + farther * farther))
     }
 }

@@ -40,6 +40,8 @@ pub(super) struct Local {
     rings: Vec<u32>,
     /// Triangles over local particles with a free corner.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Their numbers in the surface.
+    pub(super) triangle_names: Vec<u32>,
 }
 
 impl Local {
@@ -52,8 +54,10 @@ impl Local {
         let edges = prepared.edge_order.filtered(|k| any(&lattice.edges[k as usize]));
         let tetrahedra = prepared.tetrahedron_order.filtered(|k| any(&lattice.tetrahedra[k as usize]));
         let sides = prepared.side_order.filtered(|k| any(&prepared.surface.edges[k as usize].map(surface)));
-        let triangles: Vec<[u32; 3]> =
-            prepared.surface.triangles.par_iter().map(|t| t.map(surface)).filter(|t| any(t)).collect();
+        let corners = |t: u32| prepared.surface.triangles[t as usize].map(surface);
+        let triangle_names: Vec<u32> =
+            (0..prepared.surface.triangles.len() as u32).into_par_iter().filter(|&t| any(&corners(t))).collect();
+        let triangles: Vec<[u32; 3]> = triangle_names.iter().map(|&t| corners(t)).collect();
 
         let mut local = vec![NONE; prepared.rest.len()];
         let touched = [
@@ -113,6 +117,7 @@ impl Local {
             ring_starts,
             rings,
             triangles: triangles.iter().map(|t| t.map(map)).collect(),
+            triangle_names,
             global,
         }
     }
@@ -131,11 +136,6 @@ impl Local {
     pub(super) fn ring(&self, particle: u32) -> &[u32] {
         let i = particle as usize - self.nodes;
         &self.rings[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
-    }
-
-    /// The surface vertices that move freely.
-    pub(super) fn free_surface(&self) -> impl Iterator<Item = u32> + '_ {
-        (self.nodes as u32..self.particles.len() as u32).filter(|&p| self.is_free(p))
     }
 
     /// Tetrahedra turned inside out.

@@ -7,6 +7,7 @@
 
 mod balloon;
 pub mod constraint;
+mod contact;
 mod coupling;
 mod crease;
 mod frame;
@@ -25,17 +26,18 @@ mod skeleton;
 mod solver;
 mod surface;
 
-use glam::DAffine3;
+use glam::{DAffine3, Vec3};
 
+use self::contact::Skin;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 use self::projection::Kernel;
-pub use self::report::{JointReport, Report};
+pub use self::report::{JointMeasure, JointReport, Report};
 pub use self::settings::{Quality, Settings};
 use crate::error::Result;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
-use crate::skinning::dual_quaternion_blend;
+use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
 
 /// A character prepared for refinement: any number of poses, in any order.
@@ -68,14 +70,99 @@ impl Refiner {
         Ok(Self { prepared, settings, rest_positions: mesh.positions().to_vec(), weights: weights.clone() })
     }
 
-    /// Refined positions (V, 3) of a pose, one transform per bone, and what was done.
+    /// Refined positions (V, 3) of a pose, one transform per bone.
     ///
     /// Vertices away from the joints that turn are where dual quaternions put them.
     ///
     /// # Errors
     /// [`crate::Error::LengthMismatch`] if the pose has another number of bones.
-    pub fn solve(&self, pose_from_rest: &[DAffine3], quality: Quality) -> Result<(Vec<[f32; 3]>, Report)> {
-        self.solve_with(pose_from_rest, quality, Kernel::Lanes)
+    pub fn solve(&self, pose_from_rest: &[DAffine3], quality: Quality) -> Result<Vec<[f32; 3]>> {
+        Ok(self.run(pose_from_rest, quality, Kernel::Lanes, false)?.0)
+    }
+
+    /// The same with figures, and with a kernel of choice, which does not change the bits.
+    ///
+    /// # Errors
+    /// As [`Refiner::solve`].
+    pub fn solve_with_report(
+        &self,
+        pose_from_rest: &[DAffine3],
+        quality: Quality,
+        kernel: Kernel,
+    ) -> Result<(Vec<[f32; 3]>, Report)> {
+        let (positions, mut report) = self.run(pose_from_rest, quality, kernel, true)?;
+        let surface = &self.prepared.surface;
+        let count = |positions: &[[f32; 3]]| {
+            let places: Vec<[f32; 3]> = surface.source.iter().map(|&i| positions[i as usize]).collect();
+            intersecting_pairs(&places, &surface.triangles).len()
+        };
+        report.pairs_at_rest = count(&self.rest_positions);
+        report.pairs_before = count(&self.skinned(pose_from_rest)?);
+        report.pairs_after = count(&positions);
+        Ok((positions, report))
+    }
+
+    /// Pairs of triangles that intersect, and figures of every joint that turns, for skin that anybody put at `positions`
+    /// (V, 3) in this pose.
+    ///
+    /// # Errors
+    /// [`crate::Error::LengthMismatch`] if positions or bones are of another number.
+    pub fn measure(&self, pose_from_rest: &[DAffine3], positions: &[[f32; 3]]) -> Result<(usize, Vec<JointMeasure>)> {
+        check_length("positions", positions.len(), self.rest_positions.len())?;
+        check_length("pose_from_rest", pose_from_rest.len(), self.weights.n_bones() as usize)?;
+        let surface = &self.prepared.surface;
+        let welded: Vec<[f32; 3]> = surface.source.iter().map(|&i| positions[i as usize]).collect();
+        let in_cells =
+            |&place: &[f32; 3]| ((Vec3::from(place).as_dvec3() - self.prepared.middle) / self.prepared.cell).as_vec3();
+        let places: Vec<Vec3> = welded.iter().map(in_cells).collect();
+        let joints = solver::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
+        Ok((intersecting_pairs(&welded, &surface.triangles).len(), joints))
+    }
+
+    fn run(
+        &self,
+        pose_from_rest: &[DAffine3],
+        quality: Quality,
+        kernel: Kernel,
+        with_figures: bool,
+    ) -> Result<(Vec<[f32; 3]>, Report)> {
+        let start = std::time::Instant::now();
+        let mut positions = self.skinned(pose_from_rest)?;
+        let skinned = start.elapsed().as_secs_f64() * 1e3;
+        let pose = self.prepared.in_cells(pose_from_rest);
+        let mut solution = solver::solve(&self.prepared, &self.settings, &pose, quality, kernel, with_figures);
+        let mut place = vec![None; self.prepared.surface.len()];
+        solution.moved.iter().for_each(|&(vertex, at)| place[vertex as usize] = Some(self.prepared.in_mesh(at)));
+        for (position, &welded) in positions.iter_mut().zip(&self.prepared.surface.of_vertex) {
+            if let Some(at) = place[welded as usize] {
+                *position = at.to_array();
+            }
+        }
+        if self.settings.self_collision && quality == Quality::Bake {
+            let start = std::time::Instant::now();
+            self.part_limbs(&mut positions);
+            solution.report.stages.push(("limbs", start.elapsed().as_secs_f64() * 1e3));
+        }
+        solution.report.stages.insert(0, ("skin", skinned));
+        Ok((positions, solution.report))
+    }
+
+    /// Limb against limb, limb against torso: over the whole skin, once more.
+    fn part_limbs(&self, positions: &mut [[f32; 3]]) {
+        let surface = &self.prepared.surface;
+        let skin = Skin {
+            triangles: &surface.triangles,
+            names: &|t| t,
+            ring: &|i| surface.ring(i as usize),
+            is_free: &|_| true,
+        };
+        let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
+        if self.prepared.contact.part(&skin, &mut places).is_empty() {
+            return;
+        }
+        for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
+            *position = places[welded as usize].to_array();
+        }
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.
@@ -84,31 +171,5 @@ impl Refiner {
     /// As [`Refiner::solve`].
     pub fn skinned(&self, pose_from_rest: &[DAffine3]) -> Result<Vec<[f32; 3]>> {
         dual_quaternion_blend(&self.rest_positions, &self.weights, pose_from_rest, None)
-    }
-
-    /// The same with a kernel of choice, which does not change the bits.
-    ///
-    /// # Errors
-    /// As [`Refiner::solve`].
-    pub fn solve_with(
-        &self,
-        pose_from_rest: &[DAffine3],
-        quality: Quality,
-        kernel: Kernel,
-    ) -> Result<(Vec<[f32; 3]>, Report)> {
-        let start = std::time::Instant::now();
-        let mut positions = dual_quaternion_blend(&self.rest_positions, &self.weights, pose_from_rest, None)?;
-        let skinned = start.elapsed().as_secs_f64() * 1e3;
-        let pose = self.prepared.in_cells(pose_from_rest);
-        let mut solution = solver::solve(&self.prepared, &self.settings, &pose, quality, kernel);
-        let mut place = vec![None; self.prepared.surface.len()];
-        solution.moved.iter().for_each(|&(vertex, at)| place[vertex as usize] = Some(self.prepared.in_mesh(at)));
-        for (position, &welded) in positions.iter_mut().zip(&self.prepared.surface.of_vertex) {
-            if let Some(at) = place[welded as usize] {
-                *position = at.to_array();
-            }
-        }
-        solution.report.stages.insert(0, ("skin", skinned));
-        Ok((positions, solution.report))
     }
 }

@@ -3,49 +3,65 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+/// Triangles that one task compares with those after them.
+const RUN: usize = 256;
+
 /// Every pair of triangles that intersect and share no corner, each once, ascending.
-///
-/// A sweep along the longest axis of the bounding box, cut into slabs that are searched in parallel.
 pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let boxes: Vec<(Vec3, Vec3)> =
-        triangles.iter().map(|t| bounds(t.map(|i| Vec3::from(positions[i as usize])))).collect();
-    let axis = longest_axis(&boxes);
-    let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-    order
-        .par_sort_unstable_by(|&a, &b| boxes[a as usize].0[axis].total_cmp(&boxes[b as usize].0[axis]).then(a.cmp(&b)));
-    let of_one = |k: usize| {
-        let i = order[k];
-        let (low, high) = boxes[i as usize];
-        let overlapping = order[k + 1..].iter().take_while(|&&j| boxes[j as usize].0[axis] <= high[axis]);
-        let near = overlapping.filter(|&&j| {
-            let (other_low, other_high) = boxes[j as usize];
-            low.cmple(other_high).all() && other_low.cmple(high).all()
-        });
-        let meets = near.filter(|&&j| intersect(positions, triangles[i as usize], triangles[j as usize]));
-        meets.map(|&j| [i.min(j), i.max(j)]).collect::<Vec<_>>()
+    intersecting_pairs_of(&|i| Vec3::from(positions[i as usize]), triangles, None)
+}
+
+/// A triangle's box, and its number.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: Vec3,
+    high: Vec3,
+    triangle: u32,
+}
+
+/// The same among some triangles (all if none are named).
+///
+/// Boxes are sorted along the longest axis, and each is compared with those that start before it ends.
+pub(super) fn intersecting_pairs_of(
+    at: &(dyn Fn(u32) -> Vec3 + Sync),
+    triangles: &[[u32; 3]],
+    among: Option<&[u32]>,
+) -> Vec<[u32; 2]> {
+    let bounds = |triangle: u32| {
+        let [a, b, c] = triangles[triangle as usize].map(at);
+        Bounds { low: a.min(b).min(c), high: a.max(b).max(c), triangle }
     };
-    let mut pairs: Vec<[u32; 2]> = (0..order.len()).into_par_iter().with_min_len(256).flat_map_iter(of_one).collect();
-    pairs.par_sort_unstable();
+    let mut boxes: Vec<Bounds> = match among {
+        Some(among) => among.iter().map(|&t| bounds(t)).collect(),
+        None => (0..triangles.len() as u32).map(bounds).collect(),
+    };
+    let axis = longest_axis(&boxes);
+    boxes.sort_unstable_by(|a, b| a.low[axis].total_cmp(&b.low[axis]).then(a.triangle.cmp(&b.triangle)));
+    let of_one = |k: usize| {
+        let one = boxes[k];
+        let overlapping = boxes[k + 1..].iter().take_while(|other| other.low[axis] <= one.high[axis]);
+        let near = overlapping.filter(|o| one.low.cmple(o.high).all() && o.low.cmple(one.high).all());
+        let corners = triangles[one.triangle as usize];
+        let meets = near.filter(|o| intersect(at, corners, triangles[o.triangle as usize]));
+        meets.map(|o| [one.triangle.min(o.triangle), one.triangle.max(o.triangle)]).collect::<Vec<_>>()
+    };
+    let mut pairs: Vec<[u32; 2]> = (0..boxes.len()).into_par_iter().with_min_len(RUN).flat_map_iter(of_one).collect();
+    pairs.sort_unstable();
     pairs
 }
 
-fn bounds([a, b, c]: [Vec3; 3]) -> (Vec3, Vec3) {
-    (a.min(b).min(c), a.max(b).max(c))
-}
-
-fn longest_axis(boxes: &[(Vec3, Vec3)]) -> usize {
+fn longest_axis(boxes: &[Bounds]) -> usize {
     let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    let (low, high) = boxes.iter().fold(empty, |whole, part| (whole.0.min(part.0), whole.1.max(part.1)));
+    let (low, high) = boxes.iter().fold(empty, |whole, part| (whole.0.min(part.low), whole.1.max(part.high)));
     (0..3).max_by(|&a, &b| (high - low)[a].total_cmp(&(high - low)[b])).expect("three axes")
 }
 
 /// Whether an edge of one passes through the inside of the other. Triangles that share a corner never count.
-fn intersect(positions: &[[f32; 3]], s: [u32; 3], t: [u32; 3]) -> bool {
+fn intersect(at: &dyn Fn(u32) -> Vec3, s: [u32; 3], t: [u32; 3]) -> bool {
     if s.iter().any(|i| t.contains(i)) {
         return false;
     }
-    let corners = |t: [u32; 3]| t.map(|i| Vec3::from(positions[i as usize]).as_dvec3());
-    let (s, t) = (corners(s), corners(t));
+    let (s, t) = (s.map(|i| at(i).as_dvec3()), t.map(|i| at(i).as_dvec3()));
     (0..3).any(|k| passes(s[k], s[(k + 1) % 3], &t) || passes(t[k], t[(k + 1) % 3], &s))
 }
 

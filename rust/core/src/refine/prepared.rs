@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
+use super::contact::Contact;
 use super::joints::{Joint, joints};
 use super::lattice::Lattice;
 use super::node_weights::particle_weights;
@@ -27,6 +28,8 @@ pub(super) struct Prepared {
     pub(super) lattice: Lattice,
     pub(super) skeleton: Skeleton,
     pub(super) joints: Vec<Joint>,
+    /// What intersects at rest.
+    pub(super) contact: Contact,
     /// Places of all particles: lattice nodes, then surface vertices.
     pub(super) rest: Vec<Vec3>,
     /// Weights of all particles.
@@ -101,6 +104,7 @@ impl Prepared {
             arms: lattice.tetrahedra.iter().map(arms).collect(),
             rest: places.iter().map(|place| place.as_vec3()).collect(),
             weights: csr(&rows, weights.n_bones()),
+            contact: Contact::new(&surface),
             surface,
             lattice,
             skeleton,

@@ -19,18 +19,29 @@ pub struct JointReport {
     pub is_limb: bool,
 }
 
+/// Figures of one joint for skin that anybody posed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointMeasure {
+    /// The bone below the joint.
+    pub bone: usize,
+    /// Volume of the joint's region against rest: -0.02 is 2 % lost.
+    pub volume: f64,
+    /// Farthest that skin is from its bone, as a multiple of the distance at rest.
+    pub bulge: f64,
+}
+
 /// Figures of one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
     /// Every joint that was active.
     pub joints: Vec<JointReport>,
-    /// Pairs of triangles that pass through each other: at rest, under dual quaternions, refined. None where not counted.
-    pub pairs_at_rest: Option<usize>,
-    /// Under dual quaternions.
-    pub pairs_before: Option<usize>,
-    /// Refined.
-    pub pairs_after: Option<usize>,
-    /// Tetrahedra that took part, and those of them turned inside out.
+    /// Pairs of triangles that pass through each other at rest.
+    pub pairs_at_rest: usize,
+    /// Pairs under dual quaternions.
+    pub pairs_before: usize,
+    /// Pairs as refined.
+    pub pairs_after: usize,
+    /// Tetrahedra that took part.
     pub active_tetrahedra: usize,
     /// Those of them turned inside out at the end.
     pub inverted_tetrahedra: usize,

@@ -6,14 +6,15 @@ use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
+use super::contact::Skin;
 use super::coupling::{carry_lattice, carry_skin, place, rejoin};
 use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
 use super::local::Local;
 use super::predictor::{follow, place_bound, skinned};
 use super::prepared::Prepared;
-use super::projection::{Energy, Kernel, Stretch, Volume, project};
-use super::report::{JointReport, Report};
+use super::projection::{Energy, Kernel, Stretch, Volume, project, untangle};
+use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
 
@@ -25,6 +26,16 @@ const TWIST_ITERATIONS: usize = 10;
 const REJOIN: f32 = 0.1;
 /// Skin around a contact that the balloon leaves alone, in radii.
 const KEPT: f32 = 0.3;
+/// Depth above the plane up to which skin counts as in contact for the balloon, in radii.
+const IN_CONTACT: f32 = 0.04;
+/// Passes over the creases in each iteration.
+const PASSES: usize = 2;
+/// Times that tetrahedra turned inside out are looked for at the end.
+const UNTANGLING: usize = 12;
+/// Loss of a joint's volume from which it is asked whether skinning did better.
+const HARM: f64 = 0.1;
+/// Times that the volume is restored and the folds that this makes are taken out.
+const BALLOONS: usize = 2;
 
 /// Times of the stages, by name, in the order they first ran.
 #[derive(Default)]
@@ -57,6 +68,7 @@ pub(super) fn solve(
     pose: &[DAffine3],
     quality: Quality,
     kernel: Kernel,
+    with_figures: bool,
 ) -> Solution {
     let mut clock = Clock::default();
     let path = Path::new(&prepared.skeleton, pose);
@@ -68,8 +80,28 @@ pub(super) fn solve(
     let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     frame.walk(&path, quality);
     frame.finish(pose, quality);
-    let report = frame.report(&path, pose);
+    let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
     Solution { moved: frame.moved(), report }
+}
+
+/// Volume and bulge of every active joint for skin at given places (welded surface vertices, in cells).
+pub(super) fn measure(
+    prepared: &Prepared,
+    settings: &Settings,
+    pose: &[DAffine3],
+    places: &[Vec3],
+) -> Vec<JointMeasure> {
+    let path = Path::new(&prepared.skeleton, pose);
+    let active = active_joints(&prepared.joints, &path, pose);
+    let local = Local::new(prepared, &active);
+    let (kernel, clock) = (Kernel::Lanes, Clock::default());
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
+    let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
+    let of_joint = |(k, axis): (usize, &Axis)| {
+        let (volume, bulge) = frame.measure(k, pose, axis, &at);
+        JointMeasure { bone: active[k].joint.bone, volume, bulge }
+    };
+    frame.axes(pose).iter().enumerate().map(of_joint).collect()
 }
 
 struct Frame<'a> {
@@ -135,7 +167,7 @@ impl Frame<'_> {
         });
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
-        clock.time("crease", || self.limit(axes, share, 2));
+        clock.time("crease", || self.limit(axes, share, PASSES));
         clock.time("couple", || carry_lattice(&mut self.local, &skin));
         clock.time("crease", || self.separate(axes, share));
         self.iterations += 1;
@@ -151,6 +183,7 @@ impl Frame<'_> {
         if settings.volume > 0.0 {
             let kind = Volume((1.0 / settings.volume - 1.0) as f32);
             project(kernel, kind, &mut local.volume, &mut local.particles);
+            untangle(&local.volume, &mut local.particles, [0.1, 0.3], 8, 1);
         }
         if settings.energy > 0.0 {
             let kind = Energy((1.0 / settings.energy) as f32);
@@ -211,18 +244,76 @@ impl Frame<'_> {
         let mut clock = std::mem::take(&mut self.clock);
         clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
         if self.settings.volume > 0.0 {
-            clock.time("balloon", || {
-                (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose));
+            clock.time("project", || {
+                untangle(&self.local.volume, &mut self.local.particles, [0.05, 0.3], 8, UNTANGLING);
             });
         }
+        let mut parted = clock.time("contact", || self.part());
+        for _ in 0..BALLOONS {
+            clock.time("balloon", || {
+                (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
+            });
+            let more = clock.time("contact", || self.part());
+            if more.is_empty() {
+                break;
+            }
+            parted.extend(more);
+        }
+        clock.time("balloon", || self.undo_harm(pose, &axes));
         self.clock = clock;
     }
 
-    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3]) {
+    /// Gives a joint back to skinning where solving has cost it far more volume than skinning does: on very coarse skin
+    /// nothing is left of the inner side once it is pressed into the plane.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis]) {
+        for k in 0..self.active.len() {
+            let (after, _) = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize]));
+            if after.abs() < HARM {
+                continue;
+            }
+            let skin = skinned(self.prepared, &self.local, pose);
+            let (before, _) = self.measure(k, pose, &axes[k], &|p| skin[p as usize]);
+            if after.abs() < before.abs() + HARM / 2.0 {
+                continue;
+            }
+            for member in &self.local.free[k] {
+                let particle = &mut self.local.particles[member.particle as usize];
+                [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
+            }
+        }
+    }
+
+    /// Takes out what folds are left in the region's skin; returns the particles that moved.
+    fn part(&mut self) -> Vec<u32> {
+        if !self.settings.self_collision {
+            return Vec::new();
+        }
+        let local = &self.local;
+        let skin = Skin {
+            triangles: &local.triangles,
+            names: &|t| local.triangle_names[t as usize],
+            ring: &|p| local.ring(p),
+            is_free: &|p| local.is_free(p),
+        };
+        let mut places: Vec<Vec3> = local.particles.iter().map(place).collect();
+        let moved = self.prepared.contact.part(&skin, &mut places);
+        for &p in &moved {
+            let particle = &mut self.local.particles[p as usize];
+            [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
+        }
+        moved
+    }
+
+    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
+        if self.settings.volume == 0.0 {
+            return;
+        }
         let members = std::mem::take(&mut self.local.free[k]);
         let joint = self.active[k].joint;
         let crease = self.crease(k, axis, 1.0, &members);
-        let contacts = crease.map(|crease| crease.contacts(&self.local, 0.04 * joint.radius)).unwrap_or_default();
+        let mut contacts =
+            crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
+        contacts.extend(parted);
         let kept = within(&self.local, &self.prepared.rest, &contacts, KEPT * joint.radius);
         let balloon = Balloon::new(&self.local, &members, &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
@@ -274,26 +365,23 @@ impl Frame<'_> {
         }
     }
 
-    fn joint_report(&self, k: usize, path: &Path<'_>, pose: &[DAffine3], axis: &Axis, before: &[Vec3]) -> JointReport {
+    /// Volume of a joint's region against rest, and the farthest that its skin is from the bones against rest.
+    fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &dyn Fn(u32) -> Vec3) -> (f64, f64) {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
         let balloon = Balloon::new(&self.local, members, &[]);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
-        let after = |p: u32| place(&self.local.particles[p as usize]);
-        let before = |p: u32| before[p as usize];
-        let share = |volume: f64| if target == 0.0 { 0.0 } else { volume / target - 1.0 };
-        let skin = || members.iter().filter(|m| self.local.is_surface(m.particle) && m.distance > 0.2 * joint.radius);
-        let bulge = |at: &dyn Fn(u32) -> Vec3| {
-            skin().map(|m| f64::from(axis.offset(at(m.particle)).length() / m.distance)).fold(0.0, f64::max)
-        };
-        JointReport {
-            bone: joint.bone,
-            angle: path.angle(joint.bone),
-            volume_before: share(balloon.volume(axis.origin, before)),
-            volume_after: share(balloon.volume(axis.origin, after)),
-            bulge_before: bulge(&before),
-            bulge_after: bulge(&after),
-            is_limb: joint.is_limb,
-        }
+        let volume = balloon.volume(axis.origin, at);
+        let skin = members.iter().filter(|m| self.local.is_surface(m.particle) && m.distance > 0.2 * joint.radius);
+        let bulge = skin.map(|m| f64::from(axis.offset(at(m.particle)).length() / m.distance)).fold(0.0, f64::max);
+        (if target == 0.0 { 0.0 } else { volume / target - 1.0 }, bulge)
+    }
+
+    fn joint_report(&self, k: usize, path: &Path<'_>, pose: &[DAffine3], axis: &Axis, before: &[Vec3]) -> JointReport {
+        let joint = self.active[k].joint;
+        let (volume_before, bulge_before) = self.measure(k, pose, axis, &|p| before[p as usize]);
+        let (volume_after, bulge_after) = self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
+        let (angle, is_limb) = (path.angle(joint.bone), joint.is_limb);
+        JointReport { bone: joint.bone, angle, volume_before, volume_after, bulge_before, bulge_after, is_limb }
     }
 
     /// Surface vertices of the whole that this frame placed: free ones, and those bound near a limb's joint.

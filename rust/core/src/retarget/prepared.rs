@@ -3,24 +3,26 @@
 use glam::{DVec3, Vec3};
 
 use super::biharmonic::{Described, blends, check_landmarks, landmarks_of_matches};
-use super::matching::{Lengths, Match, Matching};
-use super::registration::register;
 use super::rows::{Row, blended};
 use super::shares::Shares;
 use super::skeleton::{BonePair, RestBone, pairs};
 use super::warp::Warp;
-use super::welded::Welded;
 use super::{Character, Correspondence, Landmark, Report, Settings};
 use crate::adjacency::Islands;
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
+use crate::registration::Welded;
+use crate::registration::{Lengths, Match, Matching};
+use crate::registration::{Schedule, register};
 use crate::weights::Weights;
 
 /// Length over which normals are smoothed, as a share of the source's diagonal.
 const NORMAL_SMOOTHING: f64 = 0.02;
+/// The rounds of the optional registration.
+const ROUNDS: Schedule<'static> = Schedule { lengths: &[0.15, 0.1, 0.075, 0.05, 0.035, 0.025, 0.015], trusted: 0.04 };
 /// How far vertices follow the weights of their first match.
-const FOLLOW: f64 = 0.5;
+const FOLLOW: f64 = 0.4;
 
 /// Everything that is known before the first vertex is matched.
 #[derive(Debug)]
@@ -63,7 +65,7 @@ impl<'a> Prepared<'a> {
         check_landmarks(correspondence.landmarks, source.mesh.vertex_count(), target.mesh.vertex_count())?;
         let pairs = pairs(correspondence.bone_map, source.skeleton, target.skeleton)?;
         let parents = correspondence.source_parents;
-        if let Some(found) = parents.map(<[i64]>::len).filter(|&found| found != source.skeleton.bones().len()) {
+        if let Some(found) = parents.map(<[i32]>::len).filter(|&found| found != source.skeleton.bones().len()) {
             let expected = source.skeleton.bones().len();
             return Err(Error::LengthMismatch { what: "source_parents", found, expected });
         }
@@ -88,7 +90,7 @@ impl<'a> Prepared<'a> {
 
     /// What is known before the work starts.
     pub fn report(&self) -> Report {
-        let without = |(target, source): (u32, &i64)| (*source < 0).then_some(target);
+        let without = |(target, source): (u32, &i32)| (*source < 0).then_some(target);
         Report {
             vertices: self.target.of_vertex.len(),
             bones: self.guides.len(),
@@ -113,7 +115,8 @@ impl<'a> Prepared<'a> {
         progress.report(0.1);
         progress.check()?;
         if self.settings.registration {
-            positions = register(&matching, &self.target.triangles, positions, self.size, progress)?;
+            let (triangles, watch) = (&self.target.triangles, (progress, (0.1, 0.7)));
+            positions = register(&matching, triangles, positions, self.size, ROUNDS, watch)?;
         }
         let (matches, normals) = matching.closest(&positions)?;
         progress.report(0.7);
@@ -122,7 +125,7 @@ impl<'a> Prepared<'a> {
         Ok(Placed { positions, normals, source_normals, matches })
     }
 
-    /// Moves each vertex halfway to where the weights of its match would carry it: the nearest bones change abruptly between
+    /// Moves each vertex part of the way to where the weights of its match would carry it: the nearest bones change abruptly between
     /// limbs, painted weights do not.
     fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
         let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);

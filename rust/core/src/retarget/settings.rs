@@ -1,7 +1,7 @@
 //! What an artist can choose.
 
-use super::matching::MatchPoints;
 use crate::error::{Error, Result};
+use crate::registration::MatchPoints;
 
 /// How vertices of the target find their place on the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

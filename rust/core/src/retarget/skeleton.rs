@@ -97,16 +97,16 @@ pub struct BonePair {
 ///
 /// # Errors
 /// [`Error::LengthMismatch`], [`Error::InvalidParameter`], [`Error::NoCommonBones`], [`Error::UnusableBone`].
-pub fn pairs(bone_map: &[i64], source: &Skeleton, target: &Skeleton) -> Result<Vec<BonePair>> {
+pub fn pairs(bone_map: &[i32], source: &Skeleton, target: &Skeleton) -> Result<Vec<BonePair>> {
     let (found, expected) = (bone_map.len(), target.bones.len());
     if found != expected {
         return Err(Error::LengthMismatch { what: "bone_map", found, expected });
     }
-    if let Some(&value) = bone_map.iter().find(|&&s| s >= source.bones.len() as i64) {
+    if let Some(&value) = bone_map.iter().find(|&&s| s >= source.bones.len() as i32) {
         let must = "it must name a bone of the source, or be negative for none";
-        return Err(Error::InvalidParameter { name: "bone_map", value: value as f64, must });
+        return Err(Error::InvalidParameter { name: "bone_map", value: f64::from(value), must });
     }
-    let pair = |(target, &source): (usize, &i64)| {
+    let pair = |(target, &source): (usize, &i32)| {
         (source >= 0).then_some(BonePair { source: source as u32, target: target as u32 })
     };
     let pairs: Vec<BonePair> = bone_map.iter().enumerate().filter_map(pair).collect();

@@ -68,6 +68,6 @@ pub fn linear_blend(
     Ok(rest_positions.par_iter().enumerate().with_min_len(1024).map(posed).collect())
 }
 
-fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
+pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<()> {
     if found == expected { Ok(()) } else { Err(Error::LengthMismatch { what, found, expected }) }
 }

@@ -1,6 +1,7 @@
 //! Closest points on a triangle mesh.
 
 mod bvh;
+mod cheapest;
 mod closest_point;
 mod flat;
 mod lanes;
@@ -10,14 +11,17 @@ mod node;
 mod oriented;
 mod search;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::mesh::TriMesh;
 use bvh::Bvh;
+pub use cheapest::{Bound, Priced};
 pub use oriented::{OrientedPoint, OrientedSurface};
 use search::Batch;
+
+pub(crate) use morton::order as morton_order;
 
 /// Queries that one task answers; within a task each search starts from the last one's answer.
 const BATCH: usize = 512;
@@ -80,7 +84,40 @@ impl SurfaceIndex {
         answer[0]
     }
 
+    /// The cheapest points for each query (Q, 3) of a `cost` that is at least the squared distance, and those that are
+    /// nearly as cheap.
+    ///
+    /// `cost` prices the closest point of a triangle for a query, told by its number. `finish` makes the answer of what is
+    /// found for a query: the closest points, by triangle, of all triangles that are within `near` of its bound (Q), or
+    /// cost no more than the bound and no more than `slack` times the least cost. Exact, and in no way dependent on
+    /// threads or the order of queries. For a query that is not finite nothing is found.
+    pub fn cheapest_points<T: Send>(
+        &self,
+        queries: &[[f32; 3]],
+        bounds: &[Bound],
+        slack: f64,
+        cost: impl Fn(usize, &SurfacePoint) -> f64 + Sync,
+        finish: impl Fn(usize, &[Priced]) -> T + Sync,
+    ) -> Vec<T> {
+        let order = morton::order(queries);
+        let answer = |numbers: &[u32]| {
+            let (bvh, cost, finish) = (&self.bvh, &cost, &finish);
+            Arch::new().dispatch(cheapest::Batch { bvh, queries, numbers, bounds, slack, cost, finish })
+        };
+        let along_curve: Vec<Vec<T>> = order.par_chunks(BATCH).map(answer).collect();
+        let mut answers: Vec<Option<T>> = std::iter::repeat_with(|| None).take(queries.len()).collect();
+        for (&number, found) in std::iter::zip(&order, along_curve.into_iter().flatten()) {
+            answers[number as usize] = Some(found);
+        }
+        answers.into_iter().map(|answer| answer.expect("each query is on the curve once")).collect()
+    }
+
     fn answer(&self, queries: &[[f32; 3]], answers: &mut [SurfacePoint]) {
         Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
     }
+}
+
+/// Squared distance of a point to a triangle, as [`SurfaceIndex`] measures it.
+pub(crate) fn squared_distance_to_triangle(query: DVec3, corners: [DVec3; 3]) -> f64 {
+    closest_point::closest_to_origin(corners.map(|corner| corner - query)).1
 }

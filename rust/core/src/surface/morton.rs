@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// Indices of `points` along a Morton curve with 1024 cells a side over their bounding box.
-pub(super) fn order(points: &[[f32; 3]]) -> Vec<u32> {
+pub(crate) fn order(points: &[[f32; 3]]) -> Vec<u32> {
     let empty = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let join = |x: (Vec3, Vec3), y: (Vec3, Vec3)| (x.0.min(y.0), x.1.max(y.1));
     let extend = |x: (Vec3, Vec3), &p: &[f32; 3]| join(x, (p.into(), p.into()));

@@ -49,9 +49,9 @@ struct Search<'a, S> {
 
 /// A node or leaf to look into, and how far away it is at least, squared.
 #[derive(Clone, Copy)]
-struct Visit {
-    at_least: Lanes,
-    child: u32,
+pub(super) struct Visit {
+    pub(super) at_least: Lanes,
+    pub(super) child: u32,
 }
 
 /// The place of a triangle that may be the nearest to some query, likewise.
@@ -173,7 +173,7 @@ impl<S: Simd> Search<'_, S> {
 
 /// Inserts into `stack[bottom..]`, whose last is the nearest to query `leader`.
 #[inline(always)]
-fn insert_descending(stack: &mut Vec<Visit>, bottom: usize, visit: Visit, leader: usize) {
+pub(super) fn insert_descending(stack: &mut Vec<Visit>, bottom: usize, visit: Visit, leader: usize) {
     stack.push(visit);
     let mut place = stack.len() - 1;
     while place > bottom && stack[place - 1].at_least.0[leader] < visit.at_least.0[leader] {

@@ -6,22 +6,28 @@
 //! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used
 //! again.
 
+mod detail;
 mod islands;
 pub mod limit;
 pub mod matching;
+mod normals;
+mod pipeline;
 mod prepared;
-mod problem;
 mod report;
 mod settings;
+mod small_islands;
 pub mod smooth;
 mod source;
+mod target;
 
 pub use islands::{IslandPolicy, UnmatchedIsland};
 pub use matching::{Criteria, MaskValue, MatchMethod};
 pub use prepared::{Inpainting, RawWeights};
 pub use report::Report;
 pub use settings::{Length, Settings};
+pub use small_islands::SmallIslands;
 pub use source::Source;
+pub use target::TargetMesh;
 
 use crate::error::Result;
 use crate::progress::Progress;
@@ -32,26 +38,28 @@ use crate::weights::Weights;
 pub struct Transfer {
     /// The new weights: rows sum to 1, bones ascending. Rows of skipped islands are empty.
     pub weights: Weights,
-    /// Which vertices took their weights from the source.
+    /// Which vertices took their weights from the source: those that trust its row by a half or more.
     pub matched: Vec<bool>,
+    /// How far the row from the source was trusted, 0 to 1.
+    pub confidence: Vec<f32>,
+    /// Distance of each vertex to its point on the source, world units.
+    pub distances: Vec<f32>,
+    /// Angle between the normals there, radians, NaN where one is missing.
+    pub angles: Vec<f32>,
     /// Counts, islands and seconds.
     pub report: Report,
 }
 
-/// Transfers the weights of `source` to a mesh (V positions in the source's space, T triangles), once.
+/// Transfers the weights of `source` to a mesh in the source's space, once.
 ///
 /// # Errors
 /// Those of [`Inpainting::new`] and [`Inpainting::solve`].
 pub fn transfer_weights(
     source: &Source,
-    positions: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
+    target: TargetMesh,
     mask: Option<&[MaskValue]>,
     settings: &Settings,
-) -> Result<(Inpainting, Transfer)> {
-    settings.check()?;
+) -> Result<Transfer> {
     let progress = Progress::default();
-    let mut inpainting = Inpainting::new(source.clone(), positions, triangles, settings.method, &progress)?;
-    let transfer = inpainting.solve(mask, settings, &progress)?;
-    Ok((inpainting, transfer))
+    Inpainting::new(source.clone(), target, settings, &progress)?.solve(mask, settings, &progress)
 }

@@ -1,33 +1,26 @@
 //! A target prepared on a source: matching found once, factorisations kept.
 
-use glam::Vec3;
-
-use super::islands::Scene;
-use super::matching::{Matches, TargetSurface};
-use super::problem::Problem;
-use super::report::{Report, Stages};
-use super::smooth::push_normalised;
-use super::{Criteria, MaskValue, MatchMethod, Settings, Source, Transfer, limit, smooth};
-use crate::adjacency::{Islands, NONE};
-use crate::error::{Error, Result};
-use crate::fill::{Constraint, Fill, Filled, Row};
-use crate::mesh::TriMesh;
+use super::matching::Matches;
+use super::pipeline::{self, Problem};
+use super::report::Stages;
+use super::target::{Target, TargetMesh};
+use super::{Criteria, MaskValue, Settings, Source, Transfer};
+use crate::error::Result;
+use crate::fill::Row;
 use crate::progress::Progress;
-use crate::surface::SurfacePoint;
 use crate::weights::Weights;
 
 /// A target prepared for solving again and again.
 ///
-/// Points on the source are found once for each [`MatchMethod`]. A block is factored again only when its unknowns, their
-/// confidences or the smoothness length change; changing smoothing, limit, policy or the source's weights factors nothing.
+/// It is welded, and points on the source are found, once for the settings that this depends on; a solve with others
+/// does it again. A block is factored again only when its unknowns, their confidences or the smoothness length change;
+/// changing smoothing, limit, policy or the source's weights factors nothing.
 #[derive(Debug)]
 pub struct Inpainting {
     pub(super) source: Source,
-    fill: Fill,
-    normals: Vec<Vec3>,
-    pub(super) diagonal: f64,
+    pub(super) target: Target,
     pub(super) matches: Matches,
-    preparation: Vec<(&'static str, f64)>,
+    pub(super) preparation: Vec<(&'static str, f64)>,
 }
 
 /// Raw solutions, before clamping and normalising, for checks against other solvers.
@@ -40,47 +33,41 @@ pub struct RawWeights {
 }
 
 impl Inpainting {
-    /// Prepares a target mesh (V positions in the source's space, T triangles) for `method`; a solve with another one
-    /// finds its points anew.
+    /// Prepares a target in the source's space for the method, thresholds and weld tolerance of `settings`.
     ///
     /// # Errors
-    /// Those of [`TriMesh::new`], [`Error::Cancelled`].
-    pub fn new(
-        source: Source,
-        positions: Vec<[f32; 3]>,
-        triangles: Vec<[u32; 3]>,
-        method: MatchMethod,
-        progress: &Progress,
-    ) -> Result<Self> {
+    /// Those of [`TriMesh::new`](crate::TriMesh::new) and [`Settings::check`], [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn new(source: Source, target: TargetMesh, settings: &Settings, progress: &Progress) -> Result<Self> {
+        settings.check()?;
         let mut stages = Stages::start();
-        let mesh = TriMesh::new(&positions, &triangles, "target")?;
-        let (diagonal, normals) = (mesh.diagonal(), mesh.vertex_normals());
-        let matches = Matches::find(method, &source, TargetSurface { positions: &positions, normals: &normals });
-        stages.end("match");
-        progress.report(0.3);
-        progress.check()?;
-        let fill = Fill::new(positions, triangles, None)?;
+        let target = Target::new(target, settings.weld_tolerance)?;
         stages.end("laplacian");
+        progress.report(0.1);
+        progress.check()?;
+        let criteria = Criteria::new(settings, &source, &target);
+        let matches = Matches::find(settings.method, &source, target.surface(), &criteria);
+        stages.end("match");
         progress.report(0.4);
-        Ok(Self { source, fill, normals, diagonal, matches, preparation: stages.into_seconds() })
+        progress.check()?;
+        Ok(Self { source, target, matches, preparation: stages.into_seconds() })
     }
 
-    /// The point of each vertex (V) on the source that distance, angle and policies refer to.
-    pub fn points(&self) -> &[SurfacePoint] {
-        self.matches.points()
+    /// Distance of each vertex (V) to its point on the source, world units.
+    pub fn distances(&self) -> Vec<f32> {
+        self.target.expand(self.matches.distances())
     }
 
     /// Angle between the normals of each vertex and of its point (V), radians, NaN where a normal is missing.
-    pub fn angles(&self) -> &[f32] {
-        self.matches.angles()
+    pub fn angles(&self) -> Vec<f32> {
+        self.target.expand(self.matches.angles().to_vec())
     }
 
-    /// The target's islands.
-    pub fn islands(&self) -> &Islands {
-        self.fill.islands()
+    /// Island of each vertex (V), [`NONE`](crate::adjacency::NONE) for one that has neither triangle nor edge.
+    pub fn island_of_vertex(&self) -> Vec<u32> {
+        self.target.expand(self.target.fill.islands().of_vertex().to_vec())
     }
 
-    /// Gives the source other weights (V rows); nothing geometric is computed anew.
+    /// Gives the source other weights (V rows); nothing geometric is computed again.
     ///
     /// # Errors
     /// Those of [`Source::with_weights`].
@@ -90,64 +77,37 @@ impl Inpainting {
         Ok(())
     }
 
-    /// Which vertices match (V), given a `mask` (V) and the thresholds of `settings`.
+    /// Which vertices match (V), given a `mask` (V) and `settings`: those whose confidence is at least a half.
     ///
     /// # Errors
-    /// [`Error::InvalidParameter`], [`Error::LengthMismatch`].
+    /// [`Error::InvalidParameter`](crate::Error::InvalidParameter), [`Error::LengthMismatch`](crate::Error::LengthMismatch).
     pub fn matched(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<bool>> {
-        self.prepare_for(settings.method);
-        Ok(matched(&self.constraints(mask, settings)?))
+        Ok(pipeline::trusted(&self.confidence(mask, settings)?))
     }
 
-    /// Transfers the source's weights, given a `mask` (V).
+    /// How far the row that each vertex takes from the source is trusted, 0 to 1 (V): all or nothing with
+    /// [`MatchMethod::ClosestPoint`](super::MatchMethod::ClosestPoint), and where the mask decides.
     ///
     /// # Errors
-    /// [`Error::NothingMatched`], [`Error::NotPositiveDefinite`], [`Error::InvalidParameter`],
-    /// [`Error::LengthMismatch`], [`Error::Cancelled`]. A failed solve leaves the kept blocks usable.
+    /// Those of [`Inpainting::matched`].
+    pub fn confidence(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<f32>> {
+        let mask = self.prepare_for(mask, settings)?;
+        let constraints = self.matches.constraints(&pipeline::terms(self, settings), mask.as_deref());
+        Ok(self.target.expand(self.matches.confidence(&constraints, settings.softness, mask.as_deref())))
+    }
+
+    /// Transfers the source's weights, given a `mask` (V). Vertices that are one get the same bits.
+    ///
+    /// # Errors
+    /// [`Error::NothingMatched`](crate::Error::NothingMatched),
+    /// [`Error::NotPositiveDefinite`](crate::Error::NotPositiveDefinite),
+    /// [`Error::InvalidParameter`](crate::Error::InvalidParameter), [`Error::LengthMismatch`](crate::Error::LengthMismatch),
+    /// [`Error::Cancelled`](crate::Error::Cancelled). A failed solve leaves the kept blocks usable.
     pub fn solve(&mut self, mask: Option<&[MaskValue]>, settings: &Settings, progress: &Progress) -> Result<Transfer> {
-        let mut stages = Stages::start();
-        self.prepare_for(settings.method);
-        let problem = Problem::new(self, mask, settings)?;
-        let assembled = self.fill.assemble(problem.constraints.clone(), problem.smoothness_length, progress)?;
-        let factored_blocks = assembled.missing_blocks();
-        stages.end("assemble");
-        self.fill.factor(assembled, progress)?;
-        progress.report(0.7);
-        progress.check()?;
-        stages.end("factor");
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
-        let filled = self.fill.solve(&given, progress)?;
-        stages.end("solve");
-        let weights = self.gather(&filled);
-        stages.end("gather");
-        let weights = self.smooth(weights, &problem, settings);
-        stages.end("smooth");
-        progress.check()?;
-        let (weights, unmatched_islands) = self.scene(&problem).fill(weights, settings.island_policy);
-        let weights =
-            if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
-        stages.end("islands and limit");
-        let matched = matched(&problem.constraints);
-        let (source_unweighted, source_unnormalised) = self.source.unweighted_and_unnormalised();
-        let report = Report {
-            unmatched_islands,
-            factored_blocks,
-            source_unweighted,
-            source_unnormalised,
-            matched: count(&matched),
-            inpainted: count(self.fill.unknown()),
-            loose: self.islands().of_vertex().iter().filter(|&&island| island == NONE).count(),
-            islands: self.islands().count(),
-            blocks: self.fill.block_count(),
-            max_distance: problem.criteria.max_distance,
-            smoothness_length: problem.smoothness_length,
-            raw_minimum: filled.minimum(),
-            largest_residual: filled.largest_residual(),
-            seconds: self.preparation.iter().copied().chain(stages.into_seconds()).collect(),
-            ..Report::of_weights(&weights)
-        };
+        let mask = self.prepare_for(mask, settings)?;
+        let transfer = pipeline::solve(self, mask.as_deref(), settings, progress)?;
         progress.report(1.0);
-        Ok(Transfer { weights, matched, report })
+        Ok(self.target.expand_transfer(transfer))
     }
 
     /// The solutions of the blocks as they are, for checks against other solvers.
@@ -155,90 +115,38 @@ impl Inpainting {
     /// # Errors
     /// Those of [`Inpainting::solve`].
     pub fn raw_weights(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<RawWeights> {
-        self.prepare_for(settings.method);
+        let mask = self.prepare_for(mask, settings)?;
         let progress = Progress::default();
-        let problem = Problem::new(self, mask, settings)?;
-        let assembled = self.fill.assemble(problem.constraints, problem.smoothness_length, &progress)?;
-        self.fill.factor(assembled, &progress)?;
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
-        let filled = self.fill.solve(&given, &progress)?;
-        let unknown = self.fill.unknown();
-        let vertices: Vec<u32> = (0..unknown.len() as u32).filter(|&i| unknown[i as usize]).collect();
+        let problem = Problem::new(self, mask.as_deref(), settings)?;
+        let fill = &mut self.target.fill;
+        let assembled = fill.assemble(problem.constraints.clone(), problem.smoothness_length, &progress)?;
+        fill.factor(assembled, &progress)?;
+        let class_of = self.target.expand((0..self.target.fill.unknown().len() as u32).collect());
+        let is_unknown = |&i: &u32| self.target.fill.unknown()[class_of[i as usize] as usize];
+        let vertices: Vec<u32> = (0..class_of.len() as u32).filter(is_unknown).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
-        let mut row = Row::new();
-        for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
-            row.clear();
-            filled.append_row(i as usize, &mut row);
-            row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
-        }
+        pipeline::filled(self, &problem, mask.as_deref(), &progress, |filled| {
+            let mut row = Row::new();
+            for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
+                row.clear();
+                filled.append_row(class_of[i as usize] as usize, &mut row);
+                row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
+            }
+        })?;
         Ok(RawWeights { vertices, values })
     }
 
-    /// Finds the points of another method, if it is another.
-    fn prepare_for(&mut self, method: MatchMethod) {
-        if self.matches.method() != method {
-            let target = TargetSurface { positions: self.fill.mesh().positions(), normals: &self.normals };
-            self.matches = Matches::find(method, &self.source, target);
-        }
-    }
-
-    pub(super) fn constraints(&self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<Constraint>> {
+    /// Does again what other settings ask for; the mask of the mesh that is solved on.
+    fn prepare_for(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Option<Vec<MaskValue>>> {
         settings.check()?;
-        self.check_mask(mask)?;
-        Ok(self.matches.constraints(&self.criteria(settings), mask))
-    }
-
-    pub(super) fn criteria(&self, settings: &Settings) -> Criteria {
-        Criteria {
-            max_distance: settings.max_distance.of(self.diagonal),
-            max_normal_angle: settings.max_normal_angle,
-            match_flipped_normals: settings.match_flipped_normals,
+        let is_another = self.target.weld_again(settings.weld_tolerance)?;
+        let criteria = Criteria::new(settings, &self.source, &self.target);
+        if is_another || self.matches.method() != settings.method {
+            self.matches = Matches::find(settings.method, &self.source, self.target.surface(), &criteria);
+        } else {
+            self.matches.refresh(&self.source, self.target.surface(), &criteria);
         }
+        self.target.mask(mask)
     }
-
-    fn check_mask(&self, mask: Option<&[MaskValue]>) -> Result<()> {
-        let expected = self.normals.len();
-        match mask.map(<[MaskValue]>::len) {
-            Some(found) if found != expected => Err(Error::LengthMismatch { what: "mask", found, expected }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Clamps and normalises the rows; those of islands without a match stay empty.
-    fn gather(&self, filled: &Filled<'_>) -> Weights {
-        Weights::from_rows(self.normals.len(), self.source.n_bones(), Vec::new, |row, i, out| {
-            row.clear();
-            filled.append_row(i, row);
-            push_normalised(row, out);
-        })
-    }
-
-    fn smooth(&self, weights: Weights, problem: &Problem, settings: &Settings) -> Weights {
-        if settings.smoothing_iterations == 0 || settings.smoothing_factor == 0.0 {
-            return weights;
-        }
-        let (mesh, laplacian) = (self.fill.mesh(), self.fill.laplacian());
-        let region = smooth::region(&mesh, laplacian, self.fill.unknown(), problem.criteria.max_distance);
-        smooth::smooth(weights, laplacian, &region, settings.smoothing_iterations, settings.smoothing_factor)
-    }
-
-    fn scene<'a>(&'a self, problem: &'a Problem) -> Scene<'a> {
-        Scene {
-            source: &self.source,
-            mesh: self.fill.mesh(),
-            islands: self.islands(),
-            points: self.matches.points(),
-            has_match: &problem.has_match,
-            max_distance: problem.criteria.max_distance,
-        }
-    }
-}
-
-fn matched(constraints: &[Constraint]) -> Vec<bool> {
-    constraints.iter().map(|&known| known == Constraint::Fixed).collect()
-}
-
-fn count(flags: &[bool]) -> usize {
-    flags.iter().filter(|&&flag| flag).count()
 }

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use super::UnmatchedIsland;
+use super::pipeline::Problem;
+use super::{Inpainting, UnmatchedIsland};
 use crate::weights::Weights;
 
 /// Counts, islands and seconds of one transfer.
@@ -14,7 +15,9 @@ pub struct Report {
     pub matched: usize,
     /// Vertices that were solved for.
     pub inpainted: usize,
-    /// Vertices that no triangle uses: they took their closest point's weights.
+    /// Vertices that are one with an earlier vertex, and share its row.
+    pub welded: usize,
+    /// Vertices that neither triangle nor edge uses: they took their closest point's weights.
     pub loose: usize,
     /// Vertices that are left without any weight (skipped islands, or nothing weighted near a loose vertex).
     pub unweighted: usize,
@@ -22,6 +25,8 @@ pub struct Report {
     pub islands: usize,
     /// Islands without a match and what became of them.
     pub unmatched_islands: Vec<UnmatchedIsland>,
+    /// Small loose islands that were made rigid.
+    pub rigid_islands: usize,
     /// Independent blocks of the system, and how many of them had to be factored.
     pub blocks: usize,
     /// See `blocks`.
@@ -47,19 +52,41 @@ pub struct Report {
 }
 
 impl Report {
-    /// The counts that the resulting weights alone tell.
-    pub(super) fn of_weights(weights: &Weights) -> Self {
+    /// With what the problem and its blocks tell.
+    pub(super) fn of_problem(self, prepared: &Inpainting, problem: &Problem, matched: &[bool]) -> Self {
+        let fill = &prepared.target.fill;
+        let (source_unweighted, source_unnormalised) = prepared.source.unweighted_and_unnormalised();
+        Self {
+            source_unweighted,
+            source_unnormalised,
+            matched: count(matched),
+            inpainted: count(fill.unknown()),
+            loose: count(&prepared.target.is_loose()),
+            islands: fill.islands().count(),
+            blocks: fill.block_count(),
+            max_distance: problem.criteria.max_distance,
+            smoothness_length: problem.smoothness_length,
+            ..self
+        }
+    }
+
+    /// With the counts that the resulting weights alone tell.
+    pub(super) fn counting(self, weights: &Weights) -> Self {
         let influences = || weights.indptr().windows(2).map(|w| (w[1] - w[0]) as usize);
         let mut used = vec![false; weights.n_bones() as usize];
         weights.bones().iter().for_each(|&bone| used[bone as usize] = true);
         Self {
             vertices: weights.vertex_count(),
             unweighted: influences().filter(|&n| n == 0).count(),
-            bones_used: used.into_iter().filter(|&used| used).count(),
+            bones_used: count(&used),
             most_influences: influences().max().unwrap_or(0),
-            ..Self::default()
+            ..self
         }
     }
+}
+
+fn count(flags: &[bool]) -> usize {
+    flags.iter().filter(|&&flag| flag).count()
 }
 
 /// A stopwatch over consecutive stages.

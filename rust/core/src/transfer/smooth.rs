@@ -3,8 +3,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::error::Result;
 use crate::laplacian::Laplacian;
 use crate::mesh::TriMesh;
+use crate::progress::Progress;
 use crate::weights::Weights;
 
 /// Shares of a row below this are rounding noise beside the f32 that stores them, and are dropped.
@@ -36,27 +38,48 @@ pub fn region(mesh: &TriMesh<'_>, laplacian: &Laplacian, unmatched: &[bool], rea
 
 /// `iterations` passes of `w_i <- (1 - factor) w_i + factor * mean of the neighbours' w` over the vertices of `region`.
 /// Rows that are empty stay empty and count for nothing.
-pub fn smooth(weights: Weights, laplacian: &Laplacian, region: &[bool], iterations: u32, factor: f64) -> Weights {
-    (0..iterations).fold(weights, |weights, _| {
-        Weights::from_rows(
-            region.len(),
-            weights.n_bones(),
-            || Accumulator::new(weights.n_bones()),
-            |sum, i, out| {
-                let own = weights.row(i);
-                if !region[i] || own.0.is_empty() || laplacian.neighbours(i).is_empty() {
-                    out.extend(std::iter::zip(own.0, own.1).map(|(&bone, &value)| (bone, value)));
-                    return;
-                }
-                let neighbours = laplacian.neighbours(i);
-                sum.add(own, 1.0 - factor);
-                for &j in neighbours {
-                    sum.add(weights.row(j as usize), factor / neighbours.len() as f64);
-                }
-                sum.drain_normalised(out);
-            },
-        )
-    })
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn smooth(
+    mut weights: Weights,
+    laplacian: &Laplacian,
+    region: &[bool],
+    iterations: u32,
+    factor: f64,
+    progress: &Progress,
+) -> Result<Weights> {
+    for _ in 0..iterations {
+        progress.check()?;
+        let smoother = pass(&weights, laplacian, region, factor);
+        // Further passes change nothing either.
+        if smoother == weights {
+            break;
+        }
+        weights = smoother;
+    }
+    Ok(weights)
+}
+
+fn pass(weights: &Weights, laplacian: &Laplacian, region: &[bool], factor: f64) -> Weights {
+    Weights::from_rows(
+        region.len(),
+        weights.n_bones(),
+        || Accumulator::new(weights.n_bones()),
+        |sum, i, out| {
+            let own = weights.row(i);
+            let neighbours = laplacian.neighbours(i);
+            if !region[i] || own.0.is_empty() || neighbours.is_empty() {
+                out.extend(std::iter::zip(own.0, own.1).map(|(&bone, &value)| (bone, value)));
+                return;
+            }
+            sum.add(own, 1.0 - factor);
+            for &j in neighbours {
+                sum.add(weights.row(j as usize), factor / neighbours.len() as f64);
+            }
+            sum.drain_normalised(out);
+        },
+    )
 }
 
 /// A dense row of bones that remembers which 64-bone words it touched, so that draining is in bone order and cheap.

@@ -2,6 +2,7 @@
 //! and passes on what is left (Duff and Reid 1983; Liu 1992).
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use pulp::Arch;
 
@@ -12,30 +13,45 @@ use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
 use crate::kernels::{Eliminate, Pivot, Product};
 use crate::ordering::graph::Graph;
-use crate::{NotPositive, pivot_floor};
+use crate::{Failure, NotPositive, pivot_floor};
 
 /// Block columns that are eliminated on one thread before all threads use them on the rows below.
 const PIVOT_BLOCKS: usize = 16;
 
+/// How the arithmetic is done, and whether it still is.
+#[derive(Clone, Copy)]
+struct Work<'a> {
+    arch: Arch,
+    stop: &'a AtomicBool,
+}
+
+impl Work<'_> {
+    /// Once this is so, results mean nothing, and the next front ends the walk.
+    fn is_over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
 /// Factors the matrix of `graph` along `tree`. Returns all panels, one after the other.
-pub(crate) fn factor(tree: &Tree, graph: &Graph, arch: Arch) -> Result<Buffer, NotPositive> {
+pub(crate) fn factor(tree: &Tree, graph: &Graph, arch: Arch, stop: &AtomicBool) -> Result<Buffer, Failure> {
     let plan = Plan::new(tree, |index| tree.fronts[index].update_len());
     let root = tree.root();
     let mut panels = Buffer::zeroed(tree.fronts[root].subtree_panels);
     let (own, other) = plan.stacks(root);
     let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
-    walk(tree, &plan, &Factor { tree, graph, arch }, root, &mut panels, &mut own, &mut other)?;
-    Ok(panels)
+    let factor = Factor { tree, graph, work: Work { arch, stop } };
+    walk(tree, &plan, &factor, root, &mut panels, &mut own, &mut other)?;
+    if factor.work.is_over() { Err(Failure::Stopped) } else { Ok(panels) }
 }
 
 struct Factor<'a> {
     tree: &'a Tree,
     graph: &'a Graph<'a>,
-    arch: Arch,
+    work: Work<'a>,
 }
 
 impl Visit for Factor<'_> {
-    type Error = NotPositive;
+    type Error = Failure;
 
     fn store_len(&self, front: &Front) -> usize {
         front.panel_len()
@@ -49,13 +65,10 @@ impl Visit for Factor<'_> {
         self.tree.fronts[index].update_len()
     }
 
-    fn visit(
-        &self,
-        index: usize,
-        panel: &mut [f64],
-        update: &mut [f64],
-        received: Received,
-    ) -> Result<(), NotPositive> {
+    fn visit(&self, index: usize, panel: &mut [f64], update: &mut [f64], received: Received) -> Result<(), Failure> {
+        if self.work.is_over() {
+            return Err(Failure::Stopped);
+        }
         let front = &self.tree.fronts[index];
         self.assemble(front, panel);
         let children: Vec<Child> = front
@@ -63,7 +76,7 @@ impl Visit for Factor<'_> {
             .iter()
             .map(|&index| {
                 let child = &self.tree.fronts[index];
-                Child::new(self.arch, &child.in_parent, front.columns, received.from(index, child.update_len()))
+                Child::new(self.work.arch, &child.in_parent, front.columns, received.from(index, child.update_len()))
             })
             .collect();
         let mut rows = row_blocks(panel, front.columns);
@@ -75,7 +88,7 @@ impl Visit for Factor<'_> {
         self.eliminate_columns(front, &mut rows)?;
         let lower: Vec<&[f64]> = rows[front.columns.div_ceil(BLOCK)..].iter().map(|row| &**row).collect();
         let mut update = update_blocks(update);
-        product(self.arch, &lower, &lower, &mut update, 0, true);
+        product(self.work, &lower, &lower, &mut update, 0, true);
         add_children(&mut update, 0, &children);
         Ok(())
     }
@@ -102,36 +115,39 @@ impl Factor<'_> {
     }
 
     /// Left-looking elimination, [`PIVOT_BLOCKS`] block columns at a time.
-    fn eliminate_columns(&self, front: &Front, rows: &mut [&mut [f64]]) -> Result<(), NotPositive> {
+    fn eliminate_columns(&self, front: &Front, rows: &mut [&mut [f64]]) -> Result<(), Failure> {
         let k = front.columns;
         let blocks = k.div_ceil(BLOCK);
         for first in (0..blocks).step_by(PIVOT_BLOCKS) {
             let last = blocks.min(first + PIVOT_BLOCKS);
-            subtract_earlier(self.arch, &mut rows[first..], first, last - first);
+            subtract_earlier(self.work, &mut rows[first..], first, last - first);
             for block in first..last {
                 let (pivots, rest) = rows.split_at_mut(block);
-                eliminate(self.arch, pivots, &mut rest[..1], first..block, k);
+                eliminate(self.work, pivots, &mut rest[..1], first..block, k);
                 self.pivot(front, block, &mut rest[0][BLOCK * BLOCK * first..])?;
             }
             let (pivots, rest) = rows.split_at_mut(last);
-            eliminate(self.arch, pivots, rest, first..last, k);
+            eliminate(self.work, pivots, rest, first..last, k);
         }
         Ok(())
     }
 
     /// Factors block `block` of the front's diagonal, the last one of `row`.
-    fn pivot(&self, front: &Front, block: usize, row: &mut [f64]) -> Result<(), NotPositive> {
+    fn pivot(&self, front: &Front, block: usize, row: &mut [f64]) -> Result<(), Failure> {
         let columns = front.start + BLOCK * block..front.start + front.columns.min(BLOCK * block + BLOCK);
         let unknowns = &self.tree.order[columns];
         let floors: Vec<f64> = unknowns.iter().map(|&i| pivot_floor(self.graph.diagonal(i as usize))).collect();
-        let failed = |column: usize| NotPositive { unknown: unknowns[column] as usize };
-        self.arch.dispatch(Pivot { row, floors: &floors }).map_err(failed)
+        let failed = |column: usize| match self.work.is_over() {
+            true => Failure::Stopped,
+            false => Failure::NotPositive(NotPositive { unknown: unknowns[column] as usize }),
+        };
+        self.work.arch.dispatch(Pivot { row, floors: &floors }).map_err(failed)
     }
 }
 
 /// Subtracts what the block columns before `first` contribute to the next `count` ones of `rows`, the first of which is
 /// row block `first`.
-fn subtract_earlier(arch: Arch, rows: &mut [&mut [f64]], first: usize, count: usize) {
+fn subtract_earlier(work: Work<'_>, rows: &mut [&mut [f64]], first: usize, count: usize) {
     if first == 0 {
         return;
     }
@@ -142,35 +158,41 @@ fn subtract_earlier(arch: Arch, rows: &mut [&mut [f64]], first: usize, count: us
             (&*earlier, now)
         })
         .unzip();
-    product(arch, &earlier, &earlier[..count], &mut now, 0, false);
+    product(work, &earlier, &earlier[..count], &mut now, 0, false);
 }
 
 /// [`Product`] on several threads where that pays.
-fn product(arch: Arch, a: &[&[f64]], b: &[&[f64]], target: &mut [&mut [f64]], first: usize, overwrite: bool) {
+fn product(work: Work<'_>, a: &[&[f64]], b: &[&[f64]], target: &mut [&mut [f64]], first: usize, overwrite: bool) {
+    if work.is_over() {
+        return;
+    }
     let depth = b.first().map_or(0, |b| b.len());
     if target.len() > 3 && BLOCK * depth * target.len() * b.len().min(first + target.len()) > FORK {
         let middle = middle_row(first, target.len(), b.len());
         let (above, below) = a.split_at(middle);
         let (left, right) = target.split_at_mut(middle);
         rayon::join(
-            || product(arch, above, b, left, first, overwrite),
-            || product(arch, below, b, right, first + middle, overwrite),
+            || product(work, above, b, left, first, overwrite),
+            || product(work, below, b, right, first + middle, overwrite),
         );
     } else {
-        arch.dispatch(Product { a, b, target, first, overwrite });
+        work.arch.dispatch(Product { a, b, target, first, overwrite });
     }
 }
 
 /// Eliminates the block columns `blocks` in `rows`, on several threads where that pays.
-fn eliminate(arch: Arch, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks: Range<usize>, columns: usize) {
+fn eliminate(work: Work<'_>, pivots: &[&mut [f64]], rows: &mut [&mut [f64]], blocks: Range<usize>, columns: usize) {
+    if work.is_over() {
+        return;
+    }
     if rows.len() > 3 && BLOCK * rows.len() * (BLOCK * blocks.len()).pow(2) > FORK {
         let (left, right) = rows.split_at_mut((rows.len() / 6 * 3).max(3));
         rayon::join(
-            || eliminate(arch, pivots, left, blocks.clone(), columns),
-            || eliminate(arch, pivots, right, blocks.clone(), columns),
+            || eliminate(work, pivots, left, blocks.clone(), columns),
+            || eliminate(work, pivots, right, blocks.clone(), columns),
         );
     } else {
-        arch.dispatch(Eliminate { pivots, rows, first: blocks.start, last: blocks.end, columns });
+        work.arch.dispatch(Eliminate { pivots, rows, first: blocks.start, last: blocks.end, columns });
     }
 }
 

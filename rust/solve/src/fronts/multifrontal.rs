@@ -1,5 +1,7 @@
 //! The solver for surfaces: nested dissection by coordinates and a multifrontal factor.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::Vec3;
 use pulp::Arch;
 
@@ -13,7 +15,7 @@ use crate::substitute::backward::backward;
 use crate::substitute::forward::forward;
 use crate::substitute::solution::{Part, RightHandSides, Solution};
 use crate::substitute::substitution::Columns;
-use crate::{NotPositive, SymmetricMatrix};
+use crate::{Failure, SymmetricMatrix};
 
 /// Right-hand sides solved together.
 const TOGETHER: usize = 64;
@@ -30,17 +32,23 @@ impl Multifrontal {
     /// Multiplications and additions that factoring `matrix` takes; `None` if it is no surface with these positions.
     pub(crate) fn flops(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Option<f64> {
         let graph = Graph::new(matrix);
-        let tree = Tree::new(&graph, dissect(&graph, positions)?);
+        let tree = Tree::new(&graph, dissect(&graph, positions, &crate::NEVER)?);
         Some(tree.fronts[tree.root()].subtree_flops)
     }
 
     /// Factors `matrix`; `None` if it is no surface with these positions.
-    pub(crate) fn factor(matrix: &SymmetricMatrix, positions: &[Vec3]) -> Result<Option<Self>, NotPositive> {
+    pub(crate) fn factor(
+        matrix: &SymmetricMatrix,
+        positions: &[Vec3],
+        stop: &AtomicBool,
+    ) -> Result<Option<Self>, Failure> {
         let graph = Graph::new(matrix);
-        let Some(dissection) = dissect(&graph, positions) else { return Ok(None) };
+        let Some(dissection) = dissect(&graph, positions, stop) else {
+            return if stop.load(Ordering::Relaxed) { Err(Failure::Stopped) } else { Ok(None) };
+        };
         let tree = Tree::new(&graph, dissection);
         let arch = Arch::new();
-        let panels = factor(&tree, &graph, arch)?;
+        let panels = factor(&tree, &graph, arch, stop)?;
         Ok(Some(Self { tree, panels, arch }))
     }
 
@@ -112,9 +120,9 @@ pub(crate) mod tests {
         let oracle = Supernodal::factor(&matrix).unwrap();
         let wanted = oracle.solve(&rhs);
         for arch in instruction_sets() {
-            let mut solver = Multifrontal::factor(&matrix, &positions).unwrap().unwrap();
+            let mut solver = Multifrontal::factor(&matrix, &positions, &crate::NEVER).unwrap().unwrap();
             solver.arch = arch;
-            solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch).unwrap();
+            solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch, &crate::NEVER).unwrap();
             let x = solver.solve(&rhs);
             let rows = (0..1500).flat_map(|i| x.row(i).zip(wanted.row(i)));
             let worst = rows.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));

@@ -1,6 +1,6 @@
 //! Nested dissection by coordinates: cut the point cloud in half, take out the unknowns that couple the halves, repeat.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -33,12 +33,13 @@ const FREE: u32 = u32::MAX;
 const SEPARATOR: u32 = u32::MAX - 1;
 
 /// Orders the unknowns of `graph`. `None` when separators turn out large: the graph is no surface with these positions.
-pub(crate) fn dissect(graph: &Graph, positions: &[Vec3]) -> Option<Dissection> {
+/// `None` too once `stop` is set.
+pub(crate) fn dissect(graph: &Graph, positions: &[Vec3], stop: &AtomicBool) -> Option<Dissection> {
     let finite = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-FAR, FAR) };
     let positions: Vec<Vec3> = positions.iter().map(|p| Vec3::new(finite(p.x), finite(p.y), finite(p.z))).collect();
     let mut points = points(graph, &positions);
     let place = (0..points.len()).map(|_| AtomicU32::new(FREE)).collect();
-    let cutter = Cutter { graph, positions: &positions, place };
+    let cutter = Cutter { graph, positions: &positions, stop, place };
     let nodes = cutter.dissect(&mut points, 0)?;
     Some(Dissection {
         order: points.iter().map(|point| point.unknown).collect(),
@@ -58,6 +59,7 @@ fn points(graph: &Graph, positions: &[Vec3]) -> Vec<Point> {
 struct Cutter<'a> {
     graph: &'a Graph<'a>,
     positions: &'a [Vec3],
+    stop: &'a AtomicBool,
     /// Place of each unknown, [`FREE`] or [`SEPARATOR`]; of the set at hand, passing notes. Sets that are cut at the same
     /// time share no unknown, and no neighbour but in separators.
     place: Vec<AtomicU32>,
@@ -71,6 +73,9 @@ impl Cutter<'_> {
             let nodes = self.patch(points);
             self.number(points, first);
             return Some(nodes);
+        }
+        if self.stop.load(Ordering::Relaxed) {
+            return None;
         }
         let (below, above) = self.cut(points);
         if n > FORK && (n - below - above) as f64 > POOR * n as f64 {

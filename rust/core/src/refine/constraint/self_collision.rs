@@ -14,7 +14,8 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// How far inside of its half `point` lies, negative beyond the plane; `side` is +1 for the child's, -1 for the parent's.
+    /// How far inside of its half `point` lies, negative beyond the plane; `side` is +1 for the child's, -1 for the
+    /// parent's, 0 for what lies in the plane.
     pub fn depth(&self, point: Vec3, side: f32) -> f32 {
         (point - self.origin).dot(self.normal) * side - self.gap
     }

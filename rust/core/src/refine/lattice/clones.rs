@@ -104,7 +104,8 @@ fn links(elements: &[Element], sharers: &[u32], face: [Point; 3], inside: &dyn F
         return shared;
     }
     let centre = face.into_iter().map(place).sum::<DVec3>() / 3.0;
-    let bare = sharers.iter().all(|&e| elements[e as usize].triangles.is_empty());
+    // A bare tetrahedron lies inside with all of its faces.
+    let bare = sharers.iter().any(|&e| elements[e as usize].triangles.is_empty());
     if !bare && !inside(centre) {
         return Vec::new();
     }

@@ -100,13 +100,25 @@ fn elements(
         of_tetrahedron.par_iter().flat_map_iter(|crossings| pieces(crossings, triangles, &inside)).collect();
     let crossed = |t: &Tetrahedron| of_tetrahedron.binary_search_by_key(t, |group| group[0].tetrahedron).is_ok();
     let [x, y, z] = size.ceil().as_ivec3().to_array().map(|n| n + 3);
-    let slab = |i: i32| {
+    let cubes = |i: i32| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k]));
+    let middles = |i: i32| {
         progress.check()?;
-        let cubes = (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k]));
-        let bare = cubes.flat_map(Tetrahedron::of_cube).filter(|t| !crossed(t) && inside(t.centre()));
-        Ok(bare.map(Element::inside).collect::<Vec<_>>())
+        Ok(cubes(i).map(|cube| inside(DVec3::from(cube.map(f64::from)) + 0.5)).collect::<Vec<_>>())
     };
-    let slabs: Vec<Vec<Element>> = (0..x).into_par_iter().map(slab).collect::<Result<_>>()?;
+    let middles: Vec<Vec<bool>> = (0..x + 1).into_par_iter().map(middles).collect::<Result<_>>()?;
+    let middle = |[i, j, k]: [i32; 3]| j < y && k < z && middles[i as usize][(j * z + k) as usize];
+    // A tetrahedron that skin does not cross lies on the side of its two cubes' middles, where those agree.
+    let within = |t: &Tetrahedron| {
+        let mut other = t.cube;
+        other[t.axis as usize] += 1;
+        let (a, b) = (middle(t.cube), middle(other));
+        if a == b { a } else { inside(t.centre()) }
+    };
+    let slab = |i: i32| {
+        let bare = cubes(i).flat_map(Tetrahedron::of_cube).filter(|t| within(t) && !crossed(t));
+        bare.map(Element::inside).collect::<Vec<_>>()
+    };
+    let slabs: Vec<Vec<Element>> = (0..x).into_par_iter().map(slab).collect();
     if slabs.iter().all(Vec::is_empty) && !anything_inside(&elements, inside) {
         return Err(Error::NothingInside);
     }

@@ -93,6 +93,40 @@ pub fn project<K: Kind<N, M>, const N: usize, const M: usize>(
     }
 }
 
+/// Projects the constraints of tetrahedra that have less than `least` of their volume towards `target` of it, one by one,
+/// `passes` times over those that stay so thin; then looks for others, `rounds` times in all.
+///
+/// The sweeps converge slowly where a bend turns tetrahedra inside out; there are few of them.
+pub fn untangle(
+    batch: &Batch<4, 2>,
+    particles: &mut [Particle],
+    [least, target]: [f32; 2],
+    passes: usize,
+    rounds: usize,
+) {
+    let corners = |k: usize| [0, 1, 2, 3].map(|n| batch.particles[n][k] as usize);
+    let value = |particles: &[Particle], k: usize, share: f32| {
+        let places = corners(k).map(|p| [particles[p][0], particles[p][1], particles[p][2]]);
+        volume(places, share * batch.rest[0][k])
+    };
+    for _ in 0..rounds {
+        let mut left: Vec<usize> = (0..batch.len()).filter(|&k| value(particles, k, least).value < 0.0).collect();
+        if left.is_empty() {
+            return;
+        }
+        for _ in 0..passes {
+            for &k in &left {
+                let at = corners(k);
+                let step = value(particles, k, target).project(at.map(|p| particles[p][3]), 0.0, 0.0);
+                for (p, by) in at.into_iter().zip(step.moves) {
+                    (0..3).for_each(|c| particles[p][c] += by[c]);
+                }
+            }
+            left.retain(|&k| value(particles, k, least).value < 0.0);
+        }
+    }
+}
+
 struct Sweep<'a, K, const N: usize, const M: usize> {
     kind: K,
     batch: &'a mut Batch<N, M>,

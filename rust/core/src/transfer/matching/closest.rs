@@ -1,10 +1,18 @@
 //! The closest point, matched if distance and normal are within thresholds (the paper, section 3.1).
 
+use std::f64::consts::PI;
+
 use rayon::prelude::*;
 
-use super::{Candidates, MaskValue, Matches, TargetSurface};
+use super::{MaskValue, Matches, TargetSurface};
 use crate::fill::Constraint;
-use crate::transfer::Source;
+use crate::surface::SurfacePoint;
+use crate::transfer::target::Target;
+use crate::transfer::{Length, Settings, Source};
+
+/// A relative distance refers to this.
+pub(in crate::transfer) const DISTANCE_REFERENCE: &str =
+    "the target's diagonal, or of 30 % of the source's if that is larger";
 
 /// When a vertex matches its closest point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,17 +26,42 @@ pub struct Criteria {
 }
 
 impl Criteria {
+    pub(in crate::transfer) fn new(settings: &Settings, source: &Source, target: &Target) -> Self {
+        Self {
+            max_distance: match settings.max_distance {
+                Length::Absolute(distance) => distance,
+                Length::Relative(share) => share * Self::distance_reference(source, target),
+            },
+            max_normal_angle: settings.max_normal_angle,
+            match_flipped_normals: settings.match_flipped_normals,
+        }
+    }
+
+    /// What a relative distance refers to, world units: a button is as far from the body as the shirt that it is on.
+    pub(in crate::transfer) fn distance_reference(source: &Source, target: &Target) -> f64 {
+        target.diagonal.max(0.3 * source.diagonal())
+    }
+
+    /// Whether distance and angle of vertex `i` are within the thresholds.
+    pub(super) fn accepts(&self, matches: &Matches, i: usize) -> bool {
+        let near = matches.points()[i].distance <= self.max_distance;
+        near && (matches.is_wire[i] || self.accepts_angle(matches.angles[i]))
+    }
+
     /// Whether normals at this angle agree; NaN never does.
-    fn accepts_angle(&self, angle: f32) -> bool {
-        let angle = f64::from(angle);
-        let flipped = self.match_flipped_normals && std::f64::consts::PI - angle <= self.max_normal_angle;
-        angle <= self.max_normal_angle || flipped
+    pub(super) fn accepts_angle(&self, angle: f32) -> bool {
+        self.accepts_upright(angle) || self.match_flipped_normals && PI - f64::from(angle) <= self.max_normal_angle
+    }
+
+    /// Whether normals at this angle point the same way.
+    pub(super) fn accepts_upright(&self, angle: f32) -> bool {
+        f64::from(angle) <= self.max_normal_angle
     }
 }
 
 /// The closest point of each vertex.
-pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> Candidates {
-    Candidates::one_each(source.index().closest_points(target.positions))
+pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> Vec<SurfacePoint> {
+    source.index().closest_points(target.positions)
 }
 
 /// Matched vertices are fixed, the others free.
@@ -36,10 +69,7 @@ pub(super) fn constraints(matches: &Matches, criteria: &Criteria, mask: Option<&
     let is_matched = |i: usize| match mask.map_or(MaskValue::Automatic, |mask| mask[i]) {
         MaskValue::Inpaint => false,
         MaskValue::ForceMatch => matches.weighted[i],
-        MaskValue::Automatic => {
-            let near = matches.points()[i].distance <= criteria.max_distance;
-            matches.weighted[i] && near && criteria.accepts_angle(matches.angles[i])
-        }
+        MaskValue::Automatic => matches.weighted[i] && criteria.accepts(matches, i),
     };
     let constraint = |i| if is_matched(i) { Constraint::Fixed } else { Constraint::Free };
     (0..matches.points().len()).into_par_iter().with_min_len(1024).map(constraint).collect()

@@ -4,7 +4,7 @@ import importlib
 import shutil
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "bl_ext.user_default.skinwright"
 
 

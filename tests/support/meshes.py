@@ -14,7 +14,7 @@ from pathlib import Path
 import igl
 import numpy as np
 
-CACHE = Path(__file__).resolve().parent.parent / "out" / "bench"
+CACHE = Path(__file__).resolve().parents[2] / "out" / "bench"
 
 # Size: spacing of the grid that the surface is cut from in metres, and how often it is subdivided.
 SIZES = {"5k": (0.0526, 1), "20k": (0.0526, 2), "100k": (0.0469, 3), "300k": (0.0541, 4), "1M": (0.0589, 5)}

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 SLACK = 1e-5
-"""Share of an island's mean edge that every triangle inequality must hold with (spec-transfer, section 2)."""
+"""Share of an island's mean edge that every triangle inequality must hold with."""
 
 
 @dataclass

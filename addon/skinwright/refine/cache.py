@@ -1,0 +1,89 @@
+"""Refined positions of an action, frame by frame, in a point cache file that the Mesh Cache modifier plays."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import files, jobs
+from ..scene import mesh_cache, poses
+from ..scene.error import SceneError
+from . import character as characters
+from .params import CacheFormat, RefineParams
+from .solving import Solving
+
+
+@dataclass(frozen=True)
+class CacheReport:
+    """What was written."""
+
+    target: str
+    path: str
+    frames: int
+
+    def sentence(self) -> str:
+        """One line for the status bar."""
+        return f"{self.target}: {self.frames} refined frames in {self.path}"
+
+    def all_warnings(self) -> list[str]:
+        """Nothing to warn of."""
+        return []
+
+    def to_json(self) -> dict[str, object]:
+        """Plain values."""
+        return {"target": self.target, "path": self.path, "frames": self.frames}
+
+
+def steps(
+    obj: bpy.types.Object,
+    params: RefineParams,
+    path: Path,
+    frames: tuple[int, int],
+    kind: CacheFormat = "pc2",
+    *,
+    overwrite: bool = True,
+) -> "jobs.Jobs[CacheReport]":
+    """Solve every frame of the range and write the file whole at the end; then let the modifier play it.
+
+    Raises SceneError, native.NativeError and files.FileError before anything is written.
+    """
+    first, last = frames
+    if last < first:
+        raise SceneError(f"the last frame, {last}, lies before the first, {first}")
+    mesh_cache.check(obj)
+    files.check_output(path, overwrite=overwrite)
+    character = characters.read(obj)
+    matrices = list(_poses(obj, character, range(first, last + 1)))
+    refiner = (yield Solving([lambda: character.refiner(params)]))[0]
+    solved = yield Solving([lambda pose=pose: refiner.solve(pose, quality="bake") for pose in matrices])
+    positions = np.stack(solved)
+    if not np.isfinite(positions).all():
+        raise SceneError(f"{obj.name}: a refined frame is not finite; nothing was written")
+    fps = bpy.context.scene.render.fps / bpy.context.scene.render.fps_base
+    content = pc2(positions, first) if kind == "pc2" else mdd(positions, first, fps)
+    files.write_whole(path, content)
+    mesh_cache.play(obj, path, kind, first)
+    return CacheReport(obj.name, str(path), len(positions))
+
+
+def _poses(obj: bpy.types.Object, character: characters.Character, frames: range) -> Iterator[NDArray[np.float64]]:
+    for _ in poses.frames(list(frames)):
+        yield characters.pose(obj, character)
+
+
+def pc2(positions: NDArray[np.float32], first: int) -> bytes:
+    """Point Cache 2: positions (F, V, 3)."""
+    frames, vertices = positions.shape[:2]
+    header = struct.pack("<12siiffi", b"POINTCACHE2\0", 1, vertices, float(first), 1.0, frames)
+    return header + positions.astype("<f4").tobytes()
+
+
+def mdd(positions: NDArray[np.float32], first: int, fps: float) -> bytes:
+    """Motion Designer data: positions (F, V, 3) and the time of each frame in seconds."""
+    frames, vertices = positions.shape[:2]
+    times = (np.arange(frames, dtype=np.int64) + first) / fps
+    return struct.pack(">ii", frames, vertices) + times.astype(">f4").tobytes() + positions.astype(">f4").tobytes()

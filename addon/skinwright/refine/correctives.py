@@ -1,0 +1,181 @@
+"""Corrective shape keys: joints sampled, solved, pulled back to rest, written sparsely and driven by the joints."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import jobs, native
+from ..scene import driven_keys
+from ..scene.error import SceneError
+from . import character as characters
+from .character import Character
+from .drivers import CHANNELS, expression
+from .params import CorrectiveParams
+from .pull_back import rest_offsets
+from .sampling import Sample, joints, samples
+from .solving import Solving
+
+PREFIX = "Refine"
+RECORD = "skinwright_refine"
+
+
+@dataclass
+class Certificate:
+    """What a key does in the pose it was made for, against the Armature modifier alone. Angles in degrees, volumes in
+    shares of rest (-0.02: 2 % lost), bulge as a multiple of rest, error as a share of the bone's length."""
+
+    joint: str
+    direction: str
+    angle: float
+    pairs_before: int
+    pairs_after: int
+    volume_before: float
+    volume_after: float
+    bulge_before: float
+    bulge_after: float
+    error: float
+
+
+@dataclass
+class CorrectiveReport:
+    """What was baked; `to_json` is what stays with the mesh."""
+
+    target: str
+    rig: str
+    keys: list[str] = field(default_factory=list)
+    made_basis: bool = False
+    certificates: list[Certificate] = field(default_factory=list)
+
+    def sentence(self) -> str:
+        """One line for the status bar."""
+        before, after = (sum(getattr(c, name) for c in self.certificates) for name in ("pairs_before", "pairs_after"))
+        joints = len({c.joint for c in self.certificates})
+        return (
+            f"{self.target}: {len(self.keys)} corrective keys for {joints} joints; "
+            f"intersecting pairs in the sampled poses {before} before, {after} after"
+        )
+
+    def all_warnings(self) -> list[str]:
+        """Joints that still intersect."""
+        left = sorted({c.joint for c in self.certificates if c.pairs_after > 0})
+        return [f"{self.target}: skin still intersects at {', '.join(left)} in some sampled pose"] if left else []
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Key:
+    sample: Sample
+    vertices: NDArray[np.int64]
+    offsets: NDArray[np.float64]
+
+
+def steps(
+    obj: bpy.types.Object, params: CorrectiveParams, chosen: set[str] | None = None
+) -> "jobs.Jobs[CorrectiveReport]":
+    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved."""
+    driven_keys.check(obj)
+    character = characters.read(obj)
+    bones = joints(character, chosen or set())
+    if not bones:
+        raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
+    refiner = (yield Solving([lambda: character.refiner(params)]))[0]
+    poses = samples(bones, params)
+    tasks = [lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses]
+    solved = yield Solving(tasks)
+    report = CorrectiveReport(obj.name, character.rig)
+    kept = [(key, certificate) for key, certificate in solved if key is not None]
+    for key, _ in kept:
+        if not np.isfinite(key.offsets).all():
+            raise SceneError(
+                f"{obj.name}: no finite offsets at {character.bones[key.sample.bone]}; nothing was written"
+            )
+    report.certificates = [certificate for _, certificate in kept]
+    _write(obj, character, [key for key, _ in kept], report)
+    return report
+
+
+def _solve(
+    character: Character, refiner: native.Refiner, sample: Sample, params: CorrectiveParams
+) -> tuple[_Key | None, Certificate | None]:
+    pose = sample.pose(character)
+    target, before = refiner.solve(pose, quality="bake"), character.skinned(pose)
+    offsets = rest_offsets(character, sample, target - before)
+    length = float(character.lengths()[sample.bone])
+    moved = np.flatnonzero(np.linalg.norm(offsets, axis=1) > params.tolerance * length)
+    if not moved.size:
+        return None, None
+    key = _Key(sample, moved, offsets[moved])
+    return key, _certify(character, refiner, key, pose, target, before)
+
+
+def _certify(
+    character: Character,
+    refiner: native.Refiner,
+    key: _Key,
+    pose: NDArray[np.float64],
+    target: NDArray[np.float32],
+    before: NDArray[np.float32],
+) -> Certificate:
+    """Figures of the pose as the key will show it, the left-out offsets and the damped inverse included."""
+    sample, shown = key.sample, character.positions.copy()
+    shown[key.vertices] += key.offsets.astype(np.float32)
+    after = character.posed(shown, pose)
+    first, second = refiner.measure(pose, before), refiner.measure(pose, after)
+    one, other = (_of_joint(figures, sample.bone) for figures in (first, second))
+    return Certificate(
+        joint=character.bones[sample.bone],
+        direction=f"{'+' if sample.sign > 0 else '-'}{sample.axis}",
+        angle=math.degrees(sample.angle),
+        pairs_before=first["pairs"],
+        pairs_after=second["pairs"],
+        volume_before=one["volume"],
+        volume_after=other["volume"],
+        bulge_before=one["bulge"],
+        bulge_after=other["bulge"],
+        error=float(np.linalg.norm(after - target, axis=1).max() / character.lengths()[sample.bone]),
+    )
+
+
+def _of_joint(figures: dict[str, Any], bone: int) -> dict[str, float]:
+    return next((j for j in figures["joints"] if j["bone"] == bone), {"volume": 0.0, "bulge": 1.0})
+
+
+def _write(obj: bpy.types.Object, character: Character, keys: list[_Key], report: CorrectiveReport) -> None:
+    remove(obj)
+    report.made_basis = obj.data.shape_keys is None
+    rig = bpy.data.objects[character.rig]
+    for key in keys:
+        sample = key.sample
+        name = f"{PREFIX} {character.bones[sample.bone]} {'+' if sample.sign > 0 else '-'}{sample.axis}"
+        block = driven_keys.add(obj, f"{name} {math.degrees(sample.angle):.0f}", key.vertices, key.offsets)
+        text, letters = expression(sample)
+        driven_keys.drive(block, rig, character.bones[sample.bone], text, {c: CHANNELS[c] for c in letters})
+        report.keys.append(block.name)
+    obj[RECORD] = json.dumps(report.to_json())
+
+
+def baked(obj: bpy.types.Object) -> dict[str, Any] | None:
+    """What was baked on a mesh, as `CorrectiveReport.to_json` has it; nothing where no correctives are."""
+    try:
+        record = json.loads(obj.get(RECORD, ""))
+    except (TypeError, ValueError):
+        return None
+    return record if isinstance(record, dict) and "keys" in record else None
+
+
+def remove(obj: bpy.types.Object) -> int:
+    """Take baked correctives away with their drivers, and the Basis if it was made for them; how many there were."""
+    record = baked(obj)
+    if record is None:
+        return 0
+    count = driven_keys.remove(obj, record["keys"], basis_too=record.get("made_basis", False))
+    del obj[RECORD]
+    return count

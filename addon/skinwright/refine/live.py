@@ -1,0 +1,97 @@
+"""The viewport preview: the present pose refined, on a stand-in beside the untouched mesh."""
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import native
+from ..scene import preview_object
+from ..scene.error import SceneError
+from . import character as characters
+from .character import Character
+from .follow import Follower, follow
+from .params import RefineParams
+
+
+@dataclass
+class Live:
+    """A preview under way; objects are looked up by name, as undo replaces them."""
+
+    body: Character
+    refiner: native.Refiner
+    garments: list[Follower] = field(default_factory=list)
+    pose: NDArray[np.float64] | None = None
+
+
+current: Live | None = None
+
+
+def start(obj: bpy.types.Object, garments: list[bpy.types.Object], params: RefineParams) -> Live:
+    """Prepare everything, then show. Raises SceneError and native.NativeError with nothing changed."""
+    global current
+    stop()
+    body = characters.read(obj)
+    live = Live(body, body.refiner(params))
+    for garment in garments:
+        if tuple(map(tuple, garment.matrix_world)) != tuple(map(tuple, obj.matrix_world)):
+            raise SceneError(f"{garment.name} is moved, turned or scaled against {obj.name}: apply both transforms")
+        live.garments.append(follow(body, characters.read(garment), np.eye(4)))
+    for shown in (obj, *garments):
+        preview_object.show(shown)
+    current = live
+    update()
+    return live
+
+
+def stop() -> None:
+    """Take the preview away without a trace."""
+    global current
+    current = None
+    preview_object.clear()
+
+
+def update() -> bool:
+    """Refine the present pose if it is another one; whether anything was done. Ends if an object is gone."""
+    live = current
+    if live is None:
+        return False
+    obj, rig = bpy.data.objects.get(live.body.name), bpy.data.objects.get(live.body.rig)
+    if obj is None or rig is None or len(obj.data.vertices) != len(live.body.positions):
+        stop()
+        return False
+    pose = characters.pose(obj, live.body)
+    if live.pose is not None and np.array_equal(pose, live.pose):
+        return False
+    live.pose = pose
+    refined = live.refiner.solve(pose, quality="live")
+    if not preview_object.place(obj.name, refined):
+        stop()
+        return False
+    _move_garments(live, pose, refined)
+    return True
+
+
+def _move_garments(live: Live, pose: NDArray[np.float64], refined: NDArray[np.float32]) -> None:
+    displacement = refined - live.body.skinned(pose)
+    for follower in live.garments:
+        garment = bpy.data.objects.get(follower.character.name)
+        if garment is not None:
+            own = characters.pose(garment, follower.character)
+            preview_object.place(garment.name, follower.positions(own, displacement))
+
+
+def restart() -> None:
+    """Show again what undo or saving took away."""
+    if current is None:
+        return
+    current.pose = None
+    for name in (current.body.name, *(follower.character.name for follower in current.garments)):
+        obj = bpy.data.objects.get(name)
+        if obj is None:
+            stop()
+            return
+        if preview_object.of(name) is None:
+            preview_object.show(obj)
+    update()

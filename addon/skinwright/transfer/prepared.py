@@ -1,0 +1,113 @@
+"""Targets laid over a body and ready to be solved, once or again and again."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import csr, native
+from ..csr import Rows
+from . import parts
+from .inputs import Garment
+from .params import TransferParams
+
+
+class Prepared:
+    """Targets laid over a body as one mesh; the mask and the thresholds may still change.
+
+    Arrays are those of the targets' own vertices, one target after the other: no mirrored halves.
+    """
+
+    def __init__(self, source: native.Source, garments: Sequence[Garment], params: TransferParams) -> None:
+        self.garments = garments
+        self.name = " + ".join(garment.object.name for garment in garments)
+        united = parts.united([garment.geometry for garment in garments])
+        self._settings = self._keywords(params)
+        self._inpainting = native.Inpainting(
+            source,
+            self.name,
+            united.positions,
+            united.triangles,
+            params.threads,
+            edges=united.wires,
+            **self._settings,
+        )
+
+    def set_source_weights(self, rows: Rows, n_columns: int) -> None:
+        """Gives the body other weights; a solve with them factors nothing again."""
+        self._inpainting.set_source_weights(rows, n_columns)
+
+    @cached_property
+    def distance(self) -> NDArray[np.float32]:
+        """(V,) world units."""
+        return self._own(self._inpainting.distance)
+
+    @cached_property
+    def angle(self) -> NDArray[np.float32]:
+        """(V,) radians."""
+        return self._own(self._inpainting.angle)
+
+    @cached_property
+    def islands(self) -> NDArray[np.uint32]:
+        """(V,) the loose part of each vertex."""
+        return self._own(self._inpainting.islands)
+
+    def matched(self, **thresholds: Any) -> NDArray[np.bool_]:
+        """(V,) which vertices match; waits for a job that is going on. `mask` (V,) may be among the keywords."""
+        mask = thresholds.pop("mask", None)
+        return self._own(self._inpainting.matched(mask=self._spread([mask]), **self._settings | thresholds))
+
+    def start(
+        self, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, max_influences: int
+    ) -> native.Job:
+        """Solve on threads of Rust's own; a mask (V,) or None for each target."""
+        settings = self._keywords(params) | {"max_influences": max_influences}
+        return self._inpainting.start(mask=self._spread(masks), **settings)
+
+    def _keywords(self, params: TransferParams) -> dict[str, Any]:
+        """The settings of a solve."""
+        settings = params.native()
+        del settings["threads"]
+        distances = [garment.distance for garment in self.garments]
+        return settings if None in distances else settings | {"max_distance": max(distances)}  # type: ignore[type-var]
+
+    def lost_halves(self) -> list[bool]:
+        """Whether what Mirror modifiers add to a target matches less than half as well as the target itself."""
+        if all(len(g.geometry.positions) == g.completion.n_own for g in self.garments):
+            return [False] * len(self.garments)
+        masks = self._spread([garment.mask for garment in self.garments])
+        matched, starts = self._inpainting.matched(mask=masks, **self._settings), self._starts()
+        lost = []
+        for garment, start in zip(self.garments, starts, strict=False):
+            own, end = start + garment.completion.n_own, start + len(garment.geometry.positions)
+            lost.append(end > own and bool(matched[own:end].mean() < 0.5 * matched[start:own].mean()))
+        return lost
+
+    def _starts(self) -> NDArray[np.int64]:
+        """Where each target's vertices begin, mirrored ones too, and the end."""
+        return np.cumsum([0, *(len(g.geometry.positions) for g in self.garments)], dtype=np.int64)
+
+    def split(self, values: NDArray) -> list[NDArray]:
+        """Values of all vertices, mirrored ones too, as those of each target's own."""
+        own = [garment.completion.n_own for garment in self.garments]
+        return [values[start : start + n] for start, n in zip(self._starts(), own, strict=False)]
+
+    def rows_of(self, rows: Rows, number: int) -> Rows:
+        """The rows of one target's vertices, mirrored ones too."""
+        start, end = self._starts()[number : number + 2].tolist()
+        return csr.take_rows(rows, np.arange(start, end, dtype=np.int64))
+
+    def _own(self, values: NDArray) -> NDArray:
+        found = self.split(values)
+        return found[0] if len(found) == 1 else np.concatenate(found)
+
+    def _spread(self, masks: Sequence[NDArray[np.uint8] | None]) -> NDArray[np.uint8] | None:
+        if all(mask is None for mask in masks):
+            return None
+        full = [
+            np.ones(garment.completion.n_own, np.uint8) if mask is None else mask
+            for garment, mask in zip(self.garments, masks, strict=True)
+        ]
+        return np.concatenate([g.completion.spread(mask) for g, mask in zip(self.garments, full, strict=True)])

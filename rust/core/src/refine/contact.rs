@@ -1,0 +1,137 @@
+//! Skin that has come through skin, in a fold of a crease, limb against limb or limb against torso, is pushed back out,
+//! both sides alike, and smoothed where that happened.
+
+use std::collections::HashSet;
+
+use glam::Vec3;
+
+use super::pairs::{intersecting_pairs, intersecting_pairs_of};
+use super::surface::Surface;
+
+/// Rounds of pushing.
+const ROUNDS: usize = 40;
+/// Rounds without fewer pairs after which there is no hope.
+const STALLED: usize = 5;
+/// How far a round pushes, as a share of the mean edge of the triangles in each other.
+const STEP: f32 = 0.15;
+/// How far a round moves them and the ring around towards the mean of their neighbours.
+const SMOOTHING: f32 = 0.3;
+/// Rings around the first contacts in which new ones are looked for.
+const RINGS: usize = 10;
+
+/// Pairs of triangles in contact at rest already, which are left as they are.
+#[derive(Debug, Default)]
+pub(super) struct Contact {
+    at_rest: HashSet<[u32; 2]>,
+}
+
+/// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
+pub(super) struct Skin<'a> {
+    pub(super) triangles: &'a [[u32; 3]],
+    pub(super) names: &'a (dyn Fn(u32) -> u32 + Sync),
+    pub(super) ring: &'a dyn Fn(u32) -> &'a [u32],
+    pub(super) is_free: &'a dyn Fn(u32) -> bool,
+}
+
+impl Contact {
+    pub(super) fn new(surface: &Surface) -> Self {
+        let rest: Vec<[f32; 3]> = surface.rest.iter().map(|place| place.as_vec3().to_array()).collect();
+        Self { at_rest: intersecting_pairs(&rest, &surface.triangles).into_iter().collect() }
+    }
+
+    fn pairs(&self, skin: &Skin<'_>, places: &[Vec3], among: Option<&[u32]>) -> Vec<[u32; 2]> {
+        let at = |i: u32| places[i as usize];
+        let mut pairs = intersecting_pairs_of(&at, skin.triangles, among);
+        pairs.retain(|&[a, b]| {
+            let [a, b] = [(skin.names)(a), (skin.names)(b)];
+            !self.at_rest.contains(&[a.min(b), a.max(b)])
+        });
+        pairs
+    }
+
+    /// Pushes until no pair of triangles intersects that does not at rest; if some remain, the round with the fewest counts.
+    /// Returns the vertices that moved, ascending.
+    pub(super) fn part(&self, skin: &Skin<'_>, places: &mut Vec<Vec3>) -> Vec<u32> {
+        let mut pairs = self.pairs(skin, places, None);
+        if pairs.is_empty() {
+            return Vec::new();
+        }
+        let around = grown(skin, corners(skin, &pairs), RINGS);
+        let near: HashSet<u32> = around.iter().copied().collect();
+        let among: Vec<u32> = (0..skin.triangles.len() as u32)
+            .filter(|&t| skin.triangles[t as usize].iter().any(|i| near.contains(i)))
+            .collect();
+        let mut now = places.clone();
+        let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
+        for _ in 0..ROUNDS {
+            moved.extend(push(skin, &mut now, &pairs));
+            pairs = self.pairs(skin, &now, Some(&among));
+            stalled += 1;
+            if pairs.len() < fewest {
+                (fewest, stalled) = (pairs.len(), 0);
+                places.clone_from(&now);
+            }
+            if pairs.is_empty() || stalled == STALLED {
+                break;
+            }
+        }
+        moved.sort_unstable();
+        moved.dedup();
+        moved
+    }
+}
+
+fn corners(skin: &Skin<'_>, pairs: &[[u32; 2]]) -> Vec<u32> {
+    let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles[t as usize]).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners
+}
+
+fn grown(skin: &Skin<'_>, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
+    for _ in 0..rings {
+        let ring: Vec<u32> = vertices.iter().flat_map(|&i| (skin.ring)(i)).copied().collect();
+        vertices.extend(ring);
+        vertices.sort_unstable();
+        vertices.dedup();
+    }
+    vertices
+}
+
+/// One round: the triangles of a pair move apart along the difference of their normals, then they and the ring around are
+/// smoothed. Returns what moved.
+fn push(skin: &Skin<'_>, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
+    let triangle = |t: u32| skin.triangles[t as usize];
+    let normal = |t: u32| {
+        let [a, b, c] = triangle(t).map(|i| places[i as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let touched = corners(skin, pairs);
+    let mut pushes = vec![Vec3::ZERO; touched.len()];
+    let mut length = 0.0;
+    for &[a, b] in pairs {
+        let apart = (normal(b) - normal(a)).normalize_or_zero();
+        for (t, by) in [(a, apart), (b, -apart)] {
+            for i in triangle(t) {
+                pushes[touched.binary_search(&i).expect("a corner")] += by;
+            }
+            let [i, j, _] = triangle(t).map(|i| places[i as usize]);
+            length += i.distance(j);
+        }
+    }
+    let step = STEP * length / (2 * pairs.len()) as f32;
+    for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| (skin.is_free)(**i)) {
+        places[i as usize] += by.normalize_or_zero() * step;
+    }
+    let near = grown(skin, touched, 1);
+    let mean = |&i: &u32| {
+        let ring = (skin.ring)(i);
+        let sum: Vec3 = ring.iter().map(|&n| places[n as usize]).sum();
+        if ring.is_empty() { Vec3::ZERO } else { (sum / ring.len() as f32 - places[i as usize]) * SMOOTHING }
+    };
+    let moves: Vec<Vec3> = near.iter().map(mean).collect();
+    for (&i, by) in near.iter().zip(moves).filter(|(i, _)| (skin.is_free)(**i)) {
+        places[i as usize] += by;
+    }
+    near
+}
