@@ -209,3 +209,9 @@ retarget-eval: .venv/bench.stamp $(BODY)
 .PHONY: quality-eval
 quality-eval: .venv/bench.stamp
 	.venv/bin/python bench/quality_eval.py
+
+## make monkey     2,000 random actions in each Blender that SKINWRIGHT_BLENDER_TREES or SKINWRIGHT_BLENDER names
+SEED := 1
+.PHONY: monkey
+monkey: .venv/tests.stamp
+	SKINWRIGHT_MONKEY=$(SEED),2000 .venv/bin/python -m pytest tests/gui -q -k random_actions
