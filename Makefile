@@ -197,6 +197,11 @@ autoskin-eval: .venv/bench.stamp $(BODY)
 embed-eval: .venv/bench.stamp $(BODY)
 	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)
 
+## make refine-eval  refined skin against Blender's own skinning on cylinder, joints and characters: bench/refine_results.md
+.PHONY: refine-eval
+refine-eval: .venv/bench.stamp
+	.venv/bin/python bench/refine_eval.py
+
 ## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
 .PHONY: retarget-eval
 retarget-eval: .venv/bench.stamp $(BODY)

@@ -62,11 +62,11 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if that is
-    larger): largest distance of a match; the report has the one in force.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if
+    that is larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices that
-    close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices
+    that close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
     `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
@@ -212,11 +212,12 @@ class Refiner:
         threads: int = 0,
     ) -> Refiner: ...
     def solve(self, pose_from_rest: ArrayLike, *, quality: Quality = "live") -> NDArray[np.float32]:
-        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than "bake"."""
+        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than
+        "bake"."""
 
     def measure(self, pose_from_rest: ArrayLike, positions: ArrayLike) -> dict[str, Any]:
-        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that turns
-        its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
+        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that
+        turns its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
 
     def report(self) -> dict[str, Any] | None:
         """Figures of the pose solved last, which is solved once more for them; None before the first."""

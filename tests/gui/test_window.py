@@ -15,6 +15,10 @@ def test_long_work_shows_progress_and_esc_stops_it(blender):
     assert max(blender.run("long_work", size=(1100, 800))["progress"]) > 0
 
 
+def test_a_check_shows_the_offenders_and_the_worst_pose(blender):
+    assert blender.run("check_weights", timeout=300, size=(1100, 900))["worst"]
+
+
 def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
     seen = blender.run("sculpt_weights", timeout=300, size=(1000, 900))
     assert seen["strokes"] == 2

@@ -31,6 +31,7 @@ CLASSES = (
     SKINWRIGHT_PG_object,
     SKINWRIGHT_PG_overlay,
     SKINWRIGHT_PG_sculpt,
+    SKINWRIGHT_PG_refine,
     SKINWRIGHT_PG_bone_pair,
     SKINWRIGHT_PG_retarget,
     SKINWRIGHT_PG_embed,

@@ -49,10 +49,6 @@ impl Number for i64 {
     const WHOLE: Option<(f64, f64)> = Some((-9_007_199_254_740_992.0, 9_007_199_254_740_992.0));
 }
 
-impl Number for i64 {
-    const WHOLE: Option<(f64, f64)> = Some((-9_007_199_254_740_992.0, 9_007_199_254_740_992.0));
-}
-
 impl<'py, T: Number, D: Dimension + 'py> FromPyObject<'_, 'py> for Array<'py, T, D>
 where
     PyArrayLike<'py, T, D, AllowTypeChange>: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
