@@ -15,7 +15,7 @@ ADDON_FLOORS = [
     {"csr", "errors", "memory", "registration"},
     {"declared", "files", "native", "reporting", "soundness"},
     {"jobs", "scene"},
-    {"transfer", "match", "desparsify", "sculpt", "stored", "check", "retarget", "refine", "autoskin", "wardrobe"},
+    {"transfer", "match", "desparsify", "sculpt", "stored", "check", "retarget", "refine", "autoskin", "embed", "wardrobe"},
     {"settings"},
     {"preferences", "overlay"},
     {"operators", "headless", "ui"},
