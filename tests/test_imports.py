@@ -34,7 +34,7 @@ ADDON_FLOORS = [
     {"__init__"},
 ]
 SIDEWAYS = {("match", "transfer"), ("sculpt", "desparsify"), ("stored", "transfer"), ("retarget", "transfer")}
-SIDEWAYS |= {("wardrobe", "transfer"), ("refine", "transfer"), ("autoskin", "transfer")}
+SIDEWAYS |= {("wardrobe", "transfer"), ("refine", "transfer"), ("autoskin", "transfer"), ("embed", "retarget")}
 OPERATIONS = {"transfer", "sculpt", "desparsify", "embed", "autoskin", "retarget", "refine"}
 
 

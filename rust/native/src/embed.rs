@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::ranges;
 use crate::weights::Weights;
 
 /// A skeleton embedded into a mesh.
@@ -118,7 +119,7 @@ pub fn embed_skeleton(
     template_tails: Matrix<'_, f32>,
     parents: Vector<'_, i32>,
     method: &str,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
     donor_positions: Option<Matrix<'_, f32>>,
     donor_triangles: Option<Matrix<'_, u32>>,
     donor_weights: Option<&Weights>,
@@ -144,7 +145,7 @@ pub fn start_embed_skeleton(
     template_tails: Matrix<'_, f32>,
     parents: Vector<'_, i32>,
     method: &str,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
     donor_positions: Option<Matrix<'_, f32>>,
     donor_triangles: Option<Matrix<'_, u32>>,
     donor_weights: Option<&Weights>,

@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::ranges;
 use crate::skinning::{Stack, vectors};
 use crate::weights::Weights;
 
@@ -88,7 +89,7 @@ macro_rules! retarget_function {
             method: &str,
             landmarks: Option<Matrix<'_, u32>>,
             max_influences: usize,
-            threads: usize,
+            #[pyo3(from_py_with = ranges::threads)] threads: usize,
             source_parents: Option<Vector<'_, i32>>,
             match_points: &str,
             registration: bool,

@@ -65,7 +65,7 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "smoothing_factor" => settings.smoothing_factor = share(name, &value, 1.0)?,
             "max_influences" => settings.max_influences = count(name, whole(&value)?, 0..=255)?,
             "method" => settings.method = named(name, value.extract()?, MatchMethod::ALL, method_name)?,
-            "softness" => settings.softness = within(name, value.extract()?, 1e-3..=100.0)?,
+            "softness" => settings.softness = within(name, value.extract()?, 0.05..=10.0)?,
             "island_policy" => {
                 settings.island_policy = named(name, value.extract()?, IslandPolicy::ALL, policy_name)?;
             }
