@@ -36,7 +36,8 @@ VARIANTS: dict[str, dict] = {
     "biharmonic": {"method": "biharmonic"},
 }
 # Turns about the axes of Blender's world, degrees; the same bones of MakeHuman's rig.
-POSES = {
+Turns = dict[str, tuple[str, float]]
+POSES: dict[str, Turns] = {
     "arms up": {"upperarm01.L": ("y", -60), "upperarm01.R": ("y", 60)},
     "elbows": {"lowerarm01.L": ("z", 100), "lowerarm01.R": ("z", -100)},
     "sit": {
@@ -86,7 +87,7 @@ def deformation(pair: Pair, weights: np.ndarray) -> dict[str, np.ndarray]:
     return found
 
 
-def posed(body: characters.Character, turns: dict[str, tuple[str, float]]) -> np.ndarray:
+def posed(body: characters.Character, turns: Turns) -> np.ndarray:
     """(B, 4, 4)."""
     pose = np.tile(np.eye(4), (len(body.names), 1, 1))
     for j, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -105,7 +105,7 @@ def _plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class AutoskinReport:
+class SkinnedMesh:
     """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
 
     target: str
@@ -124,6 +124,25 @@ class AutoskinReport:
             return []
         named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
         return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
+
+
+@dataclass(frozen=True)
+class AutoskinReport:
+    """Automatic weights of one or more meshes."""
+
+    meshes: list[SkinnedMesh]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return "; ".join(mesh.sentence() for mesh in self.meshes)
+
+    def all_warnings(self) -> list[str]:
+        """What is worth a look, over all meshes."""
+        return [warning for mesh in self.meshes for warning in mesh.warnings()]
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain values."""
+        return {"meshes": [asdict(mesh) for mesh in self.meshes]}
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """What only a real window can show; each test runs one script of `in_blender/`."""
 
+import os
+
 
 def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
@@ -33,3 +35,10 @@ def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
     seen = blender.run("sculpt_release", timeout=200, size=(640, 480), real_mouse=True)
     assert seen["brush down"] > 0
     assert seen["brush up"] == []
+
+
+def test_random_actions_leave_everything_in_order(blender):
+    """`SKINWRIGHT_MONKEY=SEED,ACTIONS` for another seed or more of them: 2,000 take about half an hour."""
+    seed, actions = os.environ.get("SKINWRIGHT_MONKEY", "1,150").split(",")
+    seen = blender.run("monkey", seed, actions, timeout=60 + 3 * int(actions), size=(520, 400))
+    assert seen["actions"] == int(actions) and seen["sessions"] > 0

@@ -206,7 +206,7 @@ class Refiner:
 
 
 def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: NDArray | None) -> NDArray[np.float32]:
-    """(V, 3) as Blender's Armature modifier poses them: linearly, or with Preserve Volume given rest matrices."""
+    """(V, 3) as the Armature modifier poses them: linearly, or with Preserve Volume if rest matrices are given."""
     weights = _module.Weights(*rows, len(pose_from_rest))
     if rest_bones is None:
         return _module.linear_blend(positions, weights, pose_from_rest)
@@ -216,7 +216,7 @@ def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: ND
 def closest(
     name: str, positions: NDArray, triangles: NDArray, rows: Rows, n_bones: int, queries: NDArray
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]:
-    """Triangle (n,), distance (n,) and barycentric shares (n, 3) of the surface point nearest to each query (n, 3)."""
+    """Triangle (n,), barycentric shares (n, 3) and distance (n,) of the surface point nearest to each query."""
     with _naming(name):
         source = _module.Source(positions, triangles, _module.Weights(*rows, n_bones))
         return source.closest_points(queries)

@@ -71,7 +71,7 @@ def read_pair(
 
 def match_bones(source: RestBones, target: RestBones, params: RetargetParams) -> list[BoneMatch]:
     """By the map of `params`, then by name and place. Raises SceneError for a name that is no bone."""
-    for name, partner in params.bone_map.items():
+    for name, partner in (params.bone_map or {}).items():
         for bone, bones, whose in ((name, target, "target"), (partner, source, "source")):
             if bone and bone not in bones.names:
                 raise SceneError(f"The bone map names {bone}, but the {whose} has no deforming bone of that name")

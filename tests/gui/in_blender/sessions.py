@@ -86,15 +86,13 @@ def kept_is_one_step(window: Window) -> Steps:
     assert kept[1] != bare[1] and kept[2] == bare[2] and kept[0] == bare[0]
     for _ in range(2):
         window.key("Z", ctrl=True)
-        yield 1.0
-        yield from until(nothing_is_left)
+        yield from until(lambda: state() == bare and nothing_is_left())
         assert bpy.context.mode == "OBJECT"
-        assert state() == bare, "undo after the session"
         window.key("Z", ctrl=True, shift=True)
-        yield 1.0
-        assert bpy.context.mode == "OBJECT" and state() == kept, "redo after the session"
+        yield from until(lambda: state() == kept and nothing_is_left())
+        assert bpy.context.mode == "OBJECT"
     window.key("Z", ctrl=True)
-    yield 1.0
+    yield from until(lambda: state() == bare and nothing_is_left())
 
 
 def posing_within_is_the_same_step(window: Window) -> Steps:
@@ -121,14 +119,12 @@ def posing_within_is_the_same_step(window: Window) -> Steps:
         "keeping took the pose back"
     )
     window.key("Z", ctrl=True)
-    yield 1.5
-    assert state() == bare and nothing_is_left()
+    yield from until(lambda: state() == bare and nothing_is_left())
     assert bpy.data.objects["Rig"].pose.bones["Spine.2"].matrix_basis == pose
     window.key("Z", ctrl=True, shift=True)
-    yield 1.5
-    assert state() == kept and nothing_is_left()
+    yield from until(lambda: state() == kept and nothing_is_left())
     window.key("Z", ctrl=True)
-    yield 1.5
+    yield from until(lambda: state() == bare and nothing_is_left())
 
 
 def escape_is_undoable(window: Window) -> Steps:
@@ -138,12 +134,10 @@ def escape_is_undoable(window: Window) -> Steps:
     yield from left_nothing(window)
     assert state() == bare
     window.key("Z", ctrl=True)
-    yield 0.8
-    assert state()[1] != bare[1] and state()[2] == bare[2], "undo did not bring the session's work back"
-    assert nothing_is_left() and bpy.context.mode == "OBJECT"
+    yield from until(lambda: state()[1] != bare[1])
+    assert state()[2] == bare[2] and nothing_is_left() and bpy.context.mode == "OBJECT"
     window.key("Z", ctrl=True)
-    yield 1.0
-    assert state() == bare
+    yield from until(lambda: state() == bare and nothing_is_left())
 
 
 def escape_may_mean_something_else(window: Window) -> Steps:

@@ -45,6 +45,7 @@ class SessionOperator(Operator):
         except Refused as error:
             self._tell([Message("ERROR", str(error))])
             return None
+        keeping.keep_before([session.target()], session.label)
         # The way back from the session leads to the first of these steps, the second is where its strokes begin.
         bpy.ops.ed.undo_push(message=f"Before {session.label}")
         brush_session.current = session
