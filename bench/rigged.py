@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "blender_scripts"))
-sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "native"))
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "support"))
 import glb
 import makehuman
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -43,8 +43,9 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched{self._within()}"]
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
         counts.append(f"{self._sum('inpainted')} inpainted")
+        counts += self._distance()
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
@@ -59,10 +60,10 @@ class Report:
         compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
         return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
 
-    def _within(self) -> str:
+    def _distance(self) -> list[str]:
         """The distance in force, if it is one for all."""
         distances = {f"{g.native['max_distance']:.3g}" for g in self.garments if "max_distance" in g.native}
-        return f" within {distances.pop()}" if len(distances) == 1 else ""
+        return [f"distance {distances.pop()}"] if len(distances) == 1 else []
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)
@@ -104,7 +105,7 @@ def _plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class AutoskinReport:
+class SkinnedMesh:
     """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
 
     target: str
@@ -123,6 +124,25 @@ class AutoskinReport:
             return []
         named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
         return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
+
+
+@dataclass(frozen=True)
+class AutoskinReport:
+    """Automatic weights of one or more meshes."""
+
+    meshes: list[SkinnedMesh]
+
+    def sentence(self) -> str:
+        """The line the artist reads."""
+        return "; ".join(mesh.sentence() for mesh in self.meshes)
+
+    def all_warnings(self) -> list[str]:
+        """What is worth a look, over all meshes."""
+        return [warning for mesh in self.meshes for warning in mesh.warnings()]
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain values."""
+        return {"meshes": [asdict(mesh) for mesh in self.meshes]}
 
 
 @dataclass(frozen=True)

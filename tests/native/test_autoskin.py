@@ -90,7 +90,7 @@ def test_heat_is_the_solution_of_its_equation():
     effective = distance / (0.15 + 0.85 * (0.5 * (1 + cosine)) ** 2)
     nearest = effective.min(axis=1)
     least = 1e-4 * np.linalg.norm(np.ptp(points, axis=0))
-    share = (effective <= 1.02 * nearest[:, None]).astype(float)
+    share = (effective <= 1.003 * nearest[:, None]).astype(float)
     share /= share.sum(axis=1, keepdims=True)
     stiffness, mass = cotangent_stiffness(positions, triangles)
     heat = mass * 5.0 / np.maximum(nearest, least) ** 2

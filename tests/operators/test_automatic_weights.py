@@ -1,5 +1,7 @@
 """The operator: it writes what the native function answers, and respects what the artist has."""
 
+import json
+
 import builders
 import figure
 import numpy as np
@@ -100,3 +102,15 @@ def test_refusals_are_sentences_and_write_nothing(legs, rig):
     builders.select(legs)
     with pytest.raises(RuntimeError, match="Legs has no armature"):
         bpy.ops.skinwright.automatic_weights()
+
+
+def test_the_command_does_the_same(addon, legs, rig, tmp_path, capsys):
+    report = tmp_path / "report.json"
+    arguments = ["autoskin", "--target", "Legs", "--armature", rig.name, "--resolution", "64", "--report", str(report)]
+    assert addon.headless.command_line.main(arguments) == 0
+    weights = np.nan_to_num(builders.dense(legs, BONES))
+    run(legs, rig, resolution=64)
+    np.testing.assert_array_equal(np.nan_to_num(builders.dense(legs, BONES)), weights)
+    assert f"{len(legs.data.vertices)} vertices have weights for 5 bones" in capsys.readouterr().out
+    assert json.loads(report.read_text())["meshes"][0]["bones"] == 5
+    assert addon.headless.command_line.main(["autoskin", "--target", "Nobody"]) == 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import csr, jobs, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
-from ..reporting import AutoskinReport
+from ..reporting import AutoskinReport, SkinnedMesh
 from ..scene import armature, mesh, sculpting, vertex_groups, weight_state
 from ..scene.error import SceneError
 from .params import AutoskinParams
@@ -31,7 +31,7 @@ class _Answer:
 
 def automatic_weights(
     objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, params: AutoskinParams
-) -> list[AutoskinReport]:
+) -> AutoskinReport:
     """Give meshes weights for the deforming bones of `rig`, or of the armature that deforms each.
 
     Groups that are locked, or not deforming bones of the armature, keep their weights. Nothing is written if an error
@@ -45,7 +45,7 @@ def steps(
     rig: bpy.types.Object | None,
     params: AutoskinParams,
     before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
-) -> jobs.Jobs[list[AutoskinReport]]:
+) -> jobs.Jobs[AutoskinReport]:
     """The same in steps: all are computed before the first is written, and all are written or none."""
     rigs = [_rig_of(obj, rig) for obj in objects]
     answers = []
@@ -54,7 +54,8 @@ def steps(
     if before_write:
         before_write(objects)
     with weight_state.all_or_nothing(objects):
-        return [_write(obj, its_rig, answer) for obj, its_rig, answer in zip(objects, rigs, answers, strict=True)]
+        written = zip(objects, rigs, answers, strict=True)
+        return AutoskinReport([_write(obj, its_rig, answer) for obj, its_rig, answer in written])
 
 
 def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Object:
@@ -113,10 +114,10 @@ def _beside_kept(rows: Rows, kept: Rows, max_influences: int) -> Rows:
     return rows._replace(values=values.astype(np.float32))
 
 
-def _write(obj: bpy.types.Object, rig: bpy.types.Object, answer: _Answer) -> AutoskinReport:
+def _write(obj: bpy.types.Object, rig: bpy.types.Object, answer: _Answer) -> SkinnedMesh:
     vertex_groups.write(obj, answer.names, answer.rows, answer.vertices)
     if armature.find(obj) is None:
         modifier = obj.modifiers.new(rig.name, "ARMATURE")
         modifier.object = rig
     outside = [answer.names[j] for j in answer.report["bones_outside"]]
-    return AutoskinReport(obj.name, rig.name, len(answer.vertices), len(answer.names), outside)
+    return SkinnedMesh(obj.name, rig.name, len(answer.vertices), len(answer.names), outside)

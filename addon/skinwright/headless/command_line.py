@@ -11,10 +11,10 @@ from typing import Any
 
 import bpy
 
-from .. import declared, files, native
+from .. import autoskin, declared, files, native
 from ..declared import SettingError
 from ..errors import Refused, internal
-from ..reporting import Report, SculptReport
+from ..reporting import AutoskinReport, Report, SculptReport
 from ..retarget import RetargetParams, RetargetReport, retarget_weights
 from ..retarget import from_json as retarget_from_json
 from ..retarget import to_json as retarget_to_json
@@ -28,8 +28,8 @@ from . import wardrobe as wardrobe_command
 from . import weights as weights_command
 
 DONE, FAILED, USAGE = 0, 1, 2
-Params = TransferParams | SculptParams | RetargetParams
-AnyReport = Report | SculptReport | RetargetReport
+Params = TransferParams | SculptParams | RetargetParams | autoskin.AutoskinParams
+AnyReport = Report | SculptReport | RetargetReport | AutoskinReport
 
 
 class _Failure(Refused):
@@ -44,6 +44,7 @@ def main(arguments: list[str]) -> int:
     _add_transfer(commands.add_parser("transfer", help="transfer weights from a body to garments"))
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
     _add_retarget(commands.add_parser("retarget", help="take the weights of another character"))
+    _add_autoskin(commands.add_parser("autoskin", help="compute weights for the bones of an armature from scratch"))
     _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
     _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
     _add_refine(commands.add_parser("refine", help="bake refined skin to corrective keys or a point cache"))
@@ -119,6 +120,15 @@ def _add_retarget(parser: argparse.ArgumentParser) -> None:
     )
     _add_common(parser, RetargetParams())
     parser.set_defaults(work=_retarget, read=retarget_from_json, inputs=("settings",))
+
+
+def _add_autoskin(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
+    parser.add_argument("--target", required=True, action="append", help="mesh to compute weights for; may be repeated")
+    parser.add_argument("--armature", help="object whose bones they follow; without it each mesh's own armature")
+    _add_common(parser, autoskin.AutoskinParams())
+    read_settings = lambda settings: declared.from_json(autoskin.AutoskinParams, settings)  # noqa: E731
+    parser.set_defaults(work=_autoskin, read=read_settings, inputs=("settings",))
 
 
 def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
@@ -236,6 +246,11 @@ def _transfer(options: argparse.Namespace, params: TransferParams) -> Report:
 def _retarget(options: argparse.Namespace, params: RetargetParams) -> RetargetReport:
     targets = [mesh_named(name) for name in options.target]
     return retarget_weights(bpy.context, object_named(options.source), targets, params)
+
+
+def _autoskin(options: argparse.Namespace, params: autoskin.AutoskinParams) -> AutoskinReport:
+    rig = object_named(options.armature) if options.armature else None
+    return autoskin.automatic_weights([mesh_named(name) for name in options.target], rig, params)
 
 
 def _sculpt(options: argparse.Namespace, params: SculptParams) -> SculptReport:

@@ -99,6 +99,11 @@ class Inpainting:
         with _naming(self.name):
             return self._inpainting.matched(**thresholds)
 
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.confidence(**thresholds)
+
     def start(self, **params: Any) -> "Job":
         """Solve on threads of Rust's own."""
         with _naming(self.name):
@@ -130,6 +135,32 @@ class Job:
         with _naming(self._name):
             transfer = self._job.result()
         return transfer, _rows(transfer.weights)
+
+
+class EmbeddingJob(Job):
+    """An embedding going on."""
+
+    def result(self) -> Any:
+        """skinwright_native.Embedding; waits for it."""
+        with _naming(self._name):
+            return self._job.result()
+
+
+def start_embedding(
+    name: str, mesh: tuple[NDArray, NDArray], bones: tuple[NDArray, NDArray, NDArray], donor: tuple, **options: Any
+) -> EmbeddingJob:
+    """A skeleton into a mesh, on threads of Rust's own; keyword arguments as in the stub.
+
+    `mesh` is positions and triangles; `bones` are heads, tails, parents; `donor` is empty or positions, triangles and
+    rows of the character that the bones were made for.
+    """
+    keywords = dict(options)
+    with _naming(name):
+        if donor:
+            positions, triangles, rows = donor
+            keywords |= {"donor_positions": positions, "donor_triangles": triangles}
+            keywords["donor_weights"] = _module.Weights(*rows, len(bones[0]))
+        return EmbeddingJob(name, _module.start_embed_skeleton(*mesh, *bones, **keywords))
 
 
 def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:

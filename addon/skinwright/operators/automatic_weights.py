@@ -41,14 +41,11 @@ class SKINWRIGHT_OT_automatic_weights(LongWork, AutoskinSettings, SkinwrightOper
         with mesh.object_mode(context):
             return self.complete(context, jobs.wait(self._steps(context)))
 
-    def complete(self, context: Context, reports: list[AutoskinReport]) -> set[str]:
+    def complete(self, context: Context, report: AutoskinReport) -> set[str]:
         """Say what was done, and what is worth a look."""
-        warnings = [warning for report in reports for warning in report.warnings()]
-        for report in reports[:-1]:
-            self.report({"INFO"}, report.sentence())
-        return self.tell(reports[-1].sentence(), warnings)
+        return self.tell(report.sentence(), report.all_warnings())
 
-    def _steps(self, context: Context) -> jobs.Jobs[list[AutoskinReport]]:
+    def _steps(self, context: Context) -> jobs.Jobs[AutoskinReport]:
         params = self.to_params(preferences.threads(context))
         return steps(selected_meshes(context), _armature(context), params, before_write=self.keep_before)
 

@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use skinwright_solve::{Cholesky, RightHandSides, SymmetricMatrix};
+use skinwright_solve::{Cholesky, Failure, RightHandSides, SymmetricMatrix};
 
 use super::candidates::{Candidate, Candidates};
 use super::report::Report;
@@ -19,8 +19,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
 
-/// Bones no more than this much farther than the nearest heat a vertex too.
-const AS_NEAR: f64 = 1.02;
+/// Bones no more than this much farther than the nearest heat a vertex too: where two bones meet, both ends are equally near
+/// but for rounding. Against 1.02, the evaluation's humans have 3 % less error and its animals 7 %.
+const AS_NEAR: f64 = 1.003;
 
 /// Bones solved for at a time, between two looks at the cancel request.
 const COLUMNS: usize = 32;
@@ -46,11 +47,13 @@ pub(super) fn solve(
 ) -> Result<Weights> {
     let least = 1e-4 * mesh.diagonal().max(f64::MIN_POSITIVE);
     let heaters: Vec<Heater> = (0..mesh.vertex_count()).map(|i| Heater::new(candidates.of(i), least)).collect();
-    let areas_and_matrix = assemble(mesh, &heaters, stiffness);
+    let (heat, matrix) = assemble(mesh, &heaters, stiffness);
     progress.check()?;
-    let (heat, matrix) = areas_and_matrix;
     let positions: Vec<Vec3> = mesh.positions().iter().map(|&p| p.into()).collect();
-    let factor = Cholesky::factor(matrix, &positions).map_err(|e| Error::NotPositiveDefinite { vertex: e.unknown })?;
+    let factor = Cholesky::factor_until(matrix, &positions, progress.stop()).map_err(|failure| match failure {
+        Failure::NotPositive(e) => Error::NotPositiveDefinite { vertex: e.unknown },
+        Failure::Stopped => Error::Cancelled,
+    })?;
     progress.report(0.75);
     let mut used: Vec<u32> = heaters.iter().flat_map(|h| &h.bones).copied().collect();
     used.sort_unstable();

@@ -236,4 +236,21 @@ impl Fill {
         let rows = self.blocks.solve(known, progress)?;
         Ok(Filled::new(known, self.blocks.as_slice(), rows))
     }
+
+    /// Solves the problem posed last twice with one factor: soft rows are pulled towards the `given` ones first and towards
+    /// that answer then. With l = 0 this is as smooth as l > 0 makes it, at the price of a much smaller factor. Both times
+    /// the rows of `added`, by vertex of the mesh that is solved on, come on top of what soft rows are pulled to.
+    ///
+    /// # Errors
+    /// Those of [`Fill::solve`].
+    pub fn solve_twice<'a>(
+        &'a self,
+        given: GivenRows<'a>,
+        added: GivenRows<'_>,
+        progress: &Progress,
+    ) -> Result<Filled<'a>> {
+        let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
+        let rows = self.blocks.solve_twice(known, added, progress)?;
+        Ok(Filled::new(known, self.blocks.as_slice(), rows))
+    }
 }
