@@ -41,7 +41,7 @@ fn gradients_are_derivatives() {
 
 #[test]
 fn one_hard_projection_solves_a_single_stretch_and_soft_ones_settle_at_their_compliance() {
-    let ends = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    let ends: [[f64; 3]; 2] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
     let hard = stretch(ends, 1.0).project([1.0, 1.0], 0.0, 0.0);
     assert!((hard.moves[0][0] - 0.5).abs() < 1e-9 && (hard.moves[1][0] + 0.5).abs() < 1e-9);
     // min |x - x0|^2 / 2 + C^2 / (2 alpha) leaves C = alpha C0 / (alpha + 2).
