@@ -187,6 +187,7 @@ fuzz-python: .venv/tests.stamp
 ## make soak       8,000 operations in one Blender: memory, threads, files and handlers stay flat
 soak: .venv/tests.stamp
 	$(IN_TIME) 3600 .venv/bin/python tests/fuzz/soak.py --seconds 3000 --cases 8000
+
 ## make autoskin-eval  automatic weights against artists' and Blender's own: bench/autoskin_results.md and .png
 .PHONY: autoskin-eval
 autoskin-eval: .venv/bench.stamp $(BODY)
@@ -196,3 +197,24 @@ autoskin-eval: .venv/bench.stamp $(BODY)
 .PHONY: embed-eval
 embed-eval: .venv/bench.stamp $(BODY)
 	$(IN_TIME) 900 .venv/bin/python bench/embed_eval.py --body $(BODY)
+
+## make refine-eval  refined skin against Blender's own skinning on cylinder, joints and characters: bench/refine_results.md
+.PHONY: refine-eval
+refine-eval: .venv/bench.stamp
+	.venv/bin/python bench/refine_eval.py
+
+## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
+.PHONY: retarget-eval
+retarget-eval: .venv/bench.stamp $(BODY)
+	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out
+
+## make quality-eval  transferred weights against those that artists painted: bench/quality_results.md and .png
+.PHONY: quality-eval
+quality-eval: .venv/bench.stamp
+	.venv/bin/python bench/quality_eval.py
+
+## make monkey     2,000 random actions in each Blender that SKINWRIGHT_BLENDER_TREES or SKINWRIGHT_BLENDER names
+SEED := 1
+.PHONY: monkey
+monkey: .venv/tests.stamp
+	SKINWRIGHT_MONKEY=$(SEED),2000 .venv/bin/python -m pytest tests/gui -q -k random_actions

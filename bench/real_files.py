@@ -47,7 +47,7 @@ def _measure(addon, data: Path, case: dict) -> dict | None:
     for kind, split in (("panels", _panels), ("glTF", _through_gltf)):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         source = max(_import(data / case["body"]), key=lambda obj: len(obj.data.vertices))
-        garment = split(_welded(_import(data / case["garment"])))
+        garment = split(_welded(_import(data / case["garment"]), case.get("mesh", "")))
         row[f"{kind} vertices"] = len(garment.data.vertices)
         for welded, tolerance in ((False, 0.0), (True, 1e-6)):
             params = addon.transfer.TransferParams(source_scope="ARMATURE", relative_weld_tolerance=tolerance)
@@ -64,10 +64,13 @@ def _import(path: Path) -> list[bpy.types.Object]:
     return [obj for obj in made if obj.type == "MESH" and obj.name in bpy.context.view_layer.objects]
 
 
-def _welded(objects: list[bpy.types.Object]) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (V, 3) and triangles (T, 3) of the objects, each place once; the objects go."""
+def _welded(objects: list[bpy.types.Object], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """World positions (V, 3) and triangles (T, 3) of the objects, or of the one of this name, each place once.
+
+    The objects go.
+    """
     positions, triangles, start = [], [], 0
-    for obj in objects:
+    for obj in [obj for obj in objects if name in ("", obj.name, obj.data.name)] or objects:
         obj.data.calc_loop_triangles()
         world = np.array(obj.matrix_world)
         local = np.array([vertex.co[:] for vertex in obj.data.vertices])

@@ -1,4 +1,4 @@
-"""Characters for the refinement's benchmark: meshes, weights and skeletons of .glb files, and the shared poses on them."""
+"""Characters for the benchmark of refinement: meshes, weights and skeletons of .glb files, and poses on them."""
 
 import json
 import struct
@@ -85,7 +85,7 @@ def _parents(scene: dict, joints: list[int]) -> np.ndarray:
 
 
 def _segments(heads: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """From each head to the child's that goes straightest on, as importers draw bones; leaves go on as their parent does."""
+    """From each head to the child's that goes straightest on; leaves go on as their parent does."""
     tails = np.empty_like(heads)
     for j, head in enumerate(heads):
         children = np.flatnonzero(parents == j)

@@ -21,6 +21,8 @@ def params_classes(addon):
         addon.autoskin.AutoskinParams,
         addon.desparsify.DesparsifyParams,
         addon.check.params.CheckParams,
+        addon.retarget.params.RetargetParams,
+        addon.embed.params.EmbedParams,
         addon.preferences.Preferences,
     ]
 

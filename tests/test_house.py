@@ -25,6 +25,7 @@ FEATURES = {
     "stored": {"transfer"},
     "check": set(),
     "retarget": {"transfer"},
+    "embed": {"retarget"},
     "refine": set(),
     "wardrobe": {"transfer"},
 }

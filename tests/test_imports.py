@@ -15,14 +15,26 @@ ADDON_FLOORS = [
     {"csr", "errors", "memory", "registration"},
     {"declared", "files", "native", "reporting", "soundness"},
     {"jobs", "scene"},
-    {"transfer", "match", "desparsify", "sculpt", "stored", "check", "retarget", "refine", "autoskin", "wardrobe"},
+    {
+        "transfer",
+        "match",
+        "desparsify",
+        "sculpt",
+        "stored",
+        "check",
+        "retarget",
+        "refine",
+        "autoskin",
+        "embed",
+        "wardrobe",
+    },
     {"settings"},
     {"preferences", "overlay"},
     {"operators", "headless", "ui"},
     {"__init__"},
 ]
 SIDEWAYS = {("match", "transfer"), ("sculpt", "desparsify"), ("stored", "transfer"), ("retarget", "transfer")}
-SIDEWAYS |= {("wardrobe", "transfer"), ("refine", "transfer"), ("autoskin", "transfer")}
+SIDEWAYS |= {("wardrobe", "transfer"), ("refine", "transfer"), ("autoskin", "transfer"), ("embed", "retarget")}
 OPERATIONS = {"transfer", "sculpt", "desparsify", "embed", "autoskin", "retarget", "refine"}
 
 

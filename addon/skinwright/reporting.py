@@ -43,8 +43,9 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched{self._within()}"]
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
         counts.append(f"{self._sum('inpainted')} inpainted")
+        counts += self._distance()
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)
@@ -59,10 +60,10 @@ class Report:
         compared = "".join(f"; {name} {_before_and_after(figures)}" for name, figures in self.comparison.items())
         return f"{self.source} to {names}: {', '.join(counts)}; {groups}; {seconds:.2f} s{compared}"
 
-    def _within(self) -> str:
+    def _distance(self) -> list[str]:
         """The distance in force, if it is one for all."""
         distances = {f"{g.native['max_distance']:.3g}" for g in self.garments if "max_distance" in g.native}
-        return f" within {distances.pop()}" if len(distances) == 1 else ""
+        return [f"distance {distances.pop()}"] if len(distances) == 1 else []
 
     def _sum(self, name: str) -> int:
         return sum(getattr(garment, name) for garment in self.garments)

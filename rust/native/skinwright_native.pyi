@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
+MatchMethod = Literal["paper", "confidence"]
+SmallIslands = Literal["auto", "rigid", "solved"]
 
 def version() -> str: ...
 def set_memory_budget(bytes: int | None) -> None:
@@ -51,6 +53,10 @@ class Transfer:
     @property
     def matched(self) -> NDArray[np.bool_]: ...
     @property
+    def confidence(self) -> NDArray[np.float32]:
+        """How far the row from the source was trusted, 0 to 1; `matched` are those at 0.5 or more."""
+
+    @property
     def distance(self) -> NDArray[np.float32]: ...
     @property
     def angle(self) -> NDArray[np.float32]: ...
@@ -62,16 +68,23 @@ class Transfer:
 class TransferSettings(TypedDict, total=False):
     """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
 
-    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if that is
-    larger): largest distance of a match; the report has the one in force.
+    `method`: "paper" copies the closest point's weights where distance and angle are within their thresholds and
+    ignores them elsewhere; "confidence" takes the point nearest in position and direction and trusts it over
+    `softness` times its gap: there the thresholds tell only which islands have a match at all, and the smoothness
+    length how masked vertices are filled in.
+    `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if
+    that is larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
-    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices that
-    close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
+    `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices
+    that close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
     `smoothing_iterations` Jacobi passes with `smoothing_factor`. `max_influences`: 0 for no limit.
-    `island_policy`: what islands without any match get; rows that "skip" leaves are empty.
+    `island_policy`: what islands without any match get; rows that "skip" leaves are empty. `small_islands`: "rigid"
+    gives each small, loose, nearly rigid island one row; "auto" does so with "confidence".
     """
 
+    method: MatchMethod
+    softness: float
     max_distance: float | None
     relative_max_distance: float
     max_normal_angle: float
@@ -84,6 +97,7 @@ class TransferSettings(TypedDict, total=False):
     smoothing_factor: float
     max_influences: int
     island_policy: IslandPolicy
+    small_islands: SmallIslands
 
 @final
 class Source:
@@ -126,6 +140,7 @@ class Inpainting:
     def islands(self) -> NDArray[np.uint32]: ...
     def set_source_weights(self, weights: Weights) -> None: ...
     def matched(self, **settings: Unpack[TransferSettings]) -> NDArray[np.bool_]: ...
+    def confidence(self, **settings: Unpack[TransferSettings]) -> NDArray[np.float32]: ...
     def solve(self, **settings: Unpack[TransferSettings]) -> Transfer: ...
     def start(self, **settings: Unpack[TransferSettings]) -> Job: ...
     def raw_weights(self, **settings: Unpack[TransferSettings]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
@@ -150,6 +165,8 @@ def transfer_weights(
     target_triangles: ArrayLike,
     *,
     target_edges: ArrayLike | None = None,
+    method: MatchMethod = "paper",
+    softness: float = 0.7,
     max_distance: float | None = None,
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
@@ -162,6 +179,7 @@ def transfer_weights(
     smoothing_factor: float = 0.2,
     max_influences: int = 0,
     island_policy: IslandPolicy = "bridge",
+    small_islands: SmallIslands = "auto",
     threads: int = 0,
 ) -> Transfer: ...
 def fill(
@@ -212,11 +230,12 @@ class Refiner:
         threads: int = 0,
     ) -> Refiner: ...
     def solve(self, pose_from_rest: ArrayLike, *, quality: Quality = "live") -> NDArray[np.float32]:
-        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than "bake"."""
+        """Refined positions (V, 3) of a pose (B, 4, 4) in the mesh's own space; "live" takes fewer steps than
+        "bake"."""
 
     def measure(self, pose_from_rest: ArrayLike, positions: ArrayLike) -> dict[str, Any]:
-        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that turns
-        its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
+        """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that
+        turns its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
 
     def report(self) -> dict[str, Any] | None:
         """Figures of the pose solved last, which is solved once more for them; None before the first."""
@@ -568,14 +587,23 @@ def embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Embedding:
     """Puts the bones of a template into a mesh that has none.
 
     `positions` (V, 3) and `triangles` (T, 3); `template_heads` and `template_tails` (B, 3) and `parents` (B,) int,
     negative for a root: any armature whose up and front are those of the mesh, wherever it lies and however large it
-    is. "medial" needs the shape of the mesh only.
+    is. "medial" needs the shape of the mesh only. "template" needs the character that the bones were made for:
+    `donor_positions` (D, 3), `donor_triangles`, and `donor_weights` over the bones. Its surface is drawn onto the mesh,
+    and each joint goes where it lies relative to its own surface. `mirror` (B,): the bone on the other side, its own
+    index in the middle, negative for none; without it nothing is made symmetric. `landmarks` (L, 2): a vertex of the
+    donor and one of the mesh each.
     """
 
 def start_embed_skeleton(
@@ -585,7 +613,12 @@ def start_embed_skeleton(
     template_tails: ArrayLike,
     parents: ArrayLike,
     *,
-    method: Literal["medial"] = "medial",
+    method: Literal["medial", "template"] = "medial",
     threads: int = 0,
+    donor_positions: ArrayLike | None = None,
+    donor_triangles: ArrayLike | None = None,
+    donor_weights: Weights | None = None,
+    mirror: ArrayLike | None = None,
+    landmarks: ArrayLike | None = None,
 ) -> Job:
     """The same as a job, whose result is an `Embedding`."""

@@ -1,5 +1,7 @@
 """What only a real window can show; each test runs one script of `in_blender/`."""
 
+import os
+
 
 def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
@@ -13,6 +15,10 @@ def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
 
 def test_long_work_shows_progress_and_esc_stops_it(blender):
     assert max(blender.run("long_work", size=(1100, 800))["progress"]) > 0
+
+
+def test_a_check_shows_the_offenders_and_the_worst_pose(blender):
+    assert blender.run("check_weights", timeout=300, size=(1100, 900))["worst"]
 
 
 def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
@@ -29,3 +35,10 @@ def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
     seen = blender.run("sculpt_release", timeout=200, size=(640, 480), real_mouse=True)
     assert seen["brush down"] > 0
     assert seen["brush up"] == []
+
+
+def test_random_actions_leave_everything_in_order(blender):
+    """`SKINWRIGHT_MONKEY=SEED,ACTIONS` for another seed or more of them: 2,000 take about half an hour."""
+    seed, actions = os.environ.get("SKINWRIGHT_MONKEY", "1,150").split(",")
+    seen = blender.run("monkey", seed, actions, timeout=60 + 3 * int(actions), size=(520, 400))
+    assert seen["actions"] == int(actions) and seen["sessions"] > 0

@@ -73,7 +73,7 @@ def test_parts_hang_as_prims_algorithm_says(count, height):
     for k, (squared, row) in prim(positions, triangles, island, is_solved, rows).items():
         members = np.flatnonzero(island == k)
         assert (rows[members] == rows[members[0]]).all()
-        # Where the garment is out of reach and the body nearer, the body counts, and what hangs on that island differs too.
+        # Where the garment is out of reach and the body nearer, the body counts, and what hangs there differs too.
         if squared**0.5 <= settings["max_distance"] or body_distance[k] >= squared**0.5:
             of_garment += 1
             assert np.abs(rows[members[0]] - row).max() < 1e-5

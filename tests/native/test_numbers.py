@@ -119,7 +119,9 @@ def test_no_call_takes_a_number_unchecked(native):
     """Every parameter with a number as default has been looked at here: a new one fails until it has."""
     known = {"threads", "n", "passes", "rounds", "kappa", "alpha", "stiffness", "max_distance", "smoothness_length"}
     known |= {"relative_max_distance", "max_normal_angle", "relative_smoothness_length", "smoothing_iterations"}
-    known |= {"smoothing_factor", "max_influences"}
+    known |= {"smoothing_factor", "max_influences", "softness", "relative_weld_tolerance", "length"}
+    # Automatic weights, retargeting and refinement: the next test.
+    known |= {"resolution", "normal_length", "max_stretch", "n_pairs", "stretch", "volume", "bind", "energy"}
     found = set()
     for owner in (native, native.Source, native.Inpainting, native.SculptSolver, native.Weights):
         for _, call in inspect.getmembers(owner, callable):
@@ -129,3 +131,51 @@ def test_no_call_takes_a_number_unchecked(native):
                 continue
             found |= {p.name for p in parameters if type(p.default) in (int, float)}
     assert found <= known
+
+
+BOX = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 3)], np.float32)
+SIDES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+SIDES += [[1, 5, 7], [1, 7, 3]]
+SEGMENTS = np.array([[[0.5, 0.5, 0.2], [0.5, 0.5, 1.4]], [[0.5, 0.5, 1.4], [0.5, 0.5, 2.8]]], np.float32)
+
+
+def automatic(native, **settings):
+    return native.automatic_weights(BOX, SIDES, SEGMENTS, [-1, 0], **settings)
+
+
+def embedding(native, **settings):
+    return native.biharmonic_embedding(BOX, SIDES, **settings)
+
+
+def retargeted(native, **settings):
+    weights = native.Weights.from_dense(np.tile(np.float32([1]), (8, 1)))
+    character = (np.eye(4)[None], [1.0])
+    both = (BOX, SIDES, weights, *character, BOX, SIDES, *character)
+    return native.retarget_weights(*both, bone_map=[0], **settings)
+
+
+def refiner(native, **settings):
+    weights = native.Weights.from_dense(np.tile(np.float32([0.5, 0.5]), (8, 1)))
+    return native.Refiner(BOX, SIDES, weights, [-1, 0], SEGMENTS, **settings)
+
+
+@pytest.mark.parametrize("value", [-1, 0.5, 1 << 40, 1 << 70, math.nan, math.inf])
+@pytest.mark.parametrize(("call", "name"), [(embedding, "n_pairs"), (retargeted, "n_pairs"), (retargeted, "threads")])
+def test_counts_of_the_other_operations(native, call, name, value):
+    """Nothing is allocated or started by a number that was not looked at."""
+    if name == "threads" and value == 1 << 40:
+        pytest.skip("more than the machine has are as good as all of them")
+    with pytest.raises((native.InvalidParameter, OverflowError, TypeError)):
+        call(native, **{name: value})
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [(automatic, name) for name in ("resolution", "stiffness")]
+    + [(retargeted, name) for name in ("normal_length", "max_distance", "max_normal_angle", "max_stretch")]
+    + [(refiner, name) for name in ("cell", "stretch", "volume", "bind", "energy")],
+)
+def test_lengths_and_shares_of_the_other_operations(native, call, name, value):
+    with pytest.raises(native.InvalidParameter, match=name):
+        call(native, **{name: value})

@@ -75,7 +75,7 @@ def test_shapes_and_dtypes(sheet):
     assert report["vertices"] == count and report["matched"] == result.matched.sum()
     assert report["inpainted"] == (~result.matched).sum() > 0
     assert report["raw_minimum"] == result.raw_minimum < 0.01
-    stages = ["laplacian", "match", "assemble", "factor", "solve", "gather", "smooth", "islands and limit"]
+    stages = ["laplacian", "match", "assemble", "factor", "solve", "inpaint", "smooth", "islands and limit"]
     assert list(report["seconds"]) == stages
 
 

@@ -69,6 +69,42 @@ def test_the_mask_decides(coat, session):
     assert not session.read_mask(coat)
 
 
+def test_confidence_is_graded_and_coloured(coat, session):
+    transfer = bpy.context.scene.skinwright.transfer
+    assert session.match(params()).confidence is None
+    transfer.method = "CONFIDENCE"
+    match = session.match(params())
+    x, _, z = session.garment.geometry.positions.T
+    flat, far, patch = x < -0.1, (z > 0.1) & (z < 0.6), z > 0.6
+    assert (match.confidence[flat & ~patch] > 0.9).all()
+    assert (match.confidence[far] < 0.1).all()
+    assert (match.confidence[patch] == 0).all(), "the patch hangs on the sheet"
+    before = match.confidence
+    transfer.softness = 1.4
+    softer = session.match(params()).confidence
+    assert (softer[far] < before[far]).all()
+
+    picture = import_module(f"{PACKAGE}.overlay.picture")
+    colours = import_module(f"{PACKAGE}.overlay.colours")
+    shape = {"object_name": "Coat", "positions": None, "normals": None, "triangles": None}
+    shown = picture._picture_of_match(session.match(params()), session, shape | {"kind": "MATCH"})
+    assert shown.kind == "CONFIDENCE"
+    assert [value for value, _ in shown.rows] == [1, 0.5, 0, 2, 3, 4]
+    rgb = colours.of_values(shown.kind, shown.values)
+    np.testing.assert_allclose(rgb[patch], colours.CATEGORIES[[4] * 3])
+    np.testing.assert_allclose(colours.of_values("CONFIDENCE", np.array([0.0, 1.0])), colours.CATEGORIES[[1, 0]])
+
+
+def test_the_mask_decides_with_confidence_too(coat, session):
+    bpy.context.scene.skinwright.transfer.method = "CONFIDENCE"
+    coat.skinwright.mask_group = "Match Mask"
+    builders.paint(coat, **{"Match Mask": [0.0] * 9 + [0.5] * 72 + [1.0] * 3})
+    session.read_mask(coat)
+    match = session.match(params())
+    assert (match.category[:9] == 3).all() and (match.confidence[:9] == 0).all()
+    assert (match.category[-3:] == 2).all() and (match.confidence[-3:] == 1).all()
+
+
 def test_second_press_turns_it_off(coat, session):
     bpy.ops.skinwright.preview_match()
     assert bpy.context.scene.skinwright.overlay.kind == "NONE"

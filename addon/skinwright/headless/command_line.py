@@ -23,6 +23,7 @@ from ..scene.blend_file import mesh_named, object_named
 from ..sculpt.params import SculptParams, options_from_json
 from ..sculpt.replay import read, replay
 from ..transfer import TransferParams, from_json, transfer_weights
+from . import refine as refine_command
 from . import wardrobe as wardrobe_command
 from . import weights as weights_command
 
@@ -46,6 +47,7 @@ def main(arguments: list[str]) -> int:
     _add_autoskin(commands.add_parser("autoskin", help="compute weights for the bones of an armature from scratch"))
     _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
     _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
+    _add_refine(commands.add_parser("refine", help="bake refined skin to corrective keys or a point cache"))
     return _run(parser, arguments)
 
 
@@ -87,6 +89,13 @@ def weights(arguments: list[str]) -> int:
     return _run(parser, arguments)
 
 
+def refine(arguments: list[str]) -> int:
+    """The same without the word `refine`, for the script."""
+    parser = argparse.ArgumentParser(prog="refine.py", description="Bake refined skin.")
+    _add_refine(parser)
+    return _run(parser, arguments)
+
+
 def _add_transfer(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
     parser.add_argument("--source", required=True, help="object whose weights are transferred")
@@ -125,6 +134,11 @@ def _add_autoskin(parser: argparse.ArgumentParser) -> None:
 def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
     wardrobe_command.add(parser)
     parser.set_defaults(run=wardrobe_command.run)
+
+
+def _add_refine(parser: argparse.ArgumentParser) -> None:
+    refine_command.add(parser)
+    parser.set_defaults(run=lambda options: refine_command.run(options, _value))
 
 
 def _add_weights(parser: argparse.ArgumentParser) -> None:

@@ -18,7 +18,14 @@ from ..transfer.compute import Result, bone_rows, bone_source, prepare, to_resul
 from ..transfer.inputs import read_body, read_garment, read_mask
 from ..transfer.params import TransferParams
 
-_THRESHOLDS = ("max_distance", "relative_max_distance", "max_normal_angle", "match_flipped_normals")
+_THRESHOLDS = (
+    "method",
+    "softness",
+    "max_distance",
+    "relative_max_distance",
+    "max_normal_angle",
+    "match_flipped_normals",
+)
 _NO_ISLAND = np.uint32(0xFFFFFFFF)
 
 
@@ -34,9 +41,11 @@ class Category(IntEnum):
 
 @dataclass(frozen=True)
 class Match:
-    """`category` (V,) of every vertex under these thresholds; lengths in world units, angles in radians."""
+    """`category` (V,) of every vertex under these thresholds; lengths in world units, angles in radians. `confidence`
+    (V,) in the row from the source, 0 to 1, or None with the paper's method, which knows only all or nothing."""
 
     category: NDArray[np.uint8]
+    confidence: NDArray[np.float32] | None
     max_distance: float
     max_normal_angle: float
 
@@ -98,15 +107,17 @@ class MatchSession:
         return self.last_match
 
     def _threshold(self, thresholds: dict, params: TransferParams) -> Match:
-        matched = self.inpainting.matched(**thresholds, mask=self.mask)
+        confidence = self.inpainting.confidence(**thresholds, mask=self.mask)
+        matched = confidence >= 0.5
         category = np.where(matched, Category.MATCHED, Category.INPAINTED).astype(np.uint8)
         category[matched & (self.mask == mask.FORCE_MATCH)] = Category.FORCED_MATCH
         category[self.mask == mask.INPAINT] = Category.FORCED_INPAINT
-        category[~matched & ~has_any(self.inpainting.islands, matched)] = Category.UNMATCHED_ISLAND
+        category[~matched & ~has_any(self.inpainting.islands, confidence > 0)] = Category.UNMATCHED_ISLAND
         size = float(np.linalg.norm(self.garment.geometry.size))
         absolute = params.max_distance
         max_distance = params.relative_max_distance * size if absolute is None else absolute
-        return Match(category, max_distance, params.max_normal_angle)
+        graded = confidence if params.method == "confidence" else None
+        return Match(category, graded, max_distance, params.max_normal_angle)
 
     def matched(self, match: Match) -> NDArray[np.bool_]:
         """(V,) whether a vertex takes the weights of its closest point."""

@@ -99,6 +99,11 @@ class Inpainting:
         with _naming(self.name):
             return self._inpainting.matched(**thresholds)
 
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; waits for a job that is going on."""
+        with _naming(self.name):
+            return self._inpainting.confidence(**thresholds)
+
     def start(self, **params: Any) -> "Job":
         """Solve on threads of Rust's own."""
         with _naming(self.name):
@@ -130,6 +135,32 @@ class Job:
         with _naming(self._name):
             transfer = self._job.result()
         return transfer, _rows(transfer.weights)
+
+
+class EmbeddingJob(Job):
+    """An embedding going on."""
+
+    def result(self) -> Any:
+        """skinwright_native.Embedding; waits for it."""
+        with _naming(self._name):
+            return self._job.result()
+
+
+def start_embedding(
+    name: str, mesh: tuple[NDArray, NDArray], bones: tuple[NDArray, NDArray, NDArray], donor: tuple, **options: Any
+) -> EmbeddingJob:
+    """A skeleton into a mesh, on threads of Rust's own; keyword arguments as in the stub.
+
+    `mesh` is positions and triangles; `bones` are heads, tails, parents; `donor` is empty or positions, triangles and
+    rows of the character that the bones were made for.
+    """
+    keywords = dict(options)
+    with _naming(name):
+        if donor:
+            positions, triangles, rows = donor
+            keywords |= {"donor_positions": positions, "donor_triangles": triangles}
+            keywords["donor_weights"] = _module.Weights(*rows, len(bones[0]))
+        return EmbeddingJob(name, _module.start_embed_skeleton(*mesh, *bones, **keywords))
 
 
 def start_retarget(name: str, source: tuple, rows: Rows, target: tuple, **options: Any) -> Job:
@@ -175,7 +206,7 @@ class Refiner:
 
 
 def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: NDArray | None) -> NDArray[np.float32]:
-    """(V, 3) as Blender's Armature modifier poses them: linearly, or with Preserve Volume if rest matrices are given."""
+    """(V, 3) as the Armature modifier poses them: linearly, or with Preserve Volume if rest matrices are given."""
     weights = _module.Weights(*rows, len(pose_from_rest))
     if rest_bones is None:
         return _module.linear_blend(positions, weights, pose_from_rest)
@@ -185,7 +216,7 @@ def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: ND
 def closest(
     name: str, positions: NDArray, triangles: NDArray, rows: Rows, n_bones: int, queries: NDArray
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]:
-    """Triangle (n,), distance (n,) and barycentric shares (n, 3) of the point of a surface nearest to each query (n, 3)."""
+    """Triangle (n,), barycentric shares (n, 3) and distance (n,) of the surface point nearest to each query."""
     with _naming(name):
         source = _module.Source(positions, triangles, _module.Weights(*rows, n_bones))
         return source.closest_points(queries)

@@ -5,6 +5,7 @@ from . import (
     bone_map,
     check_weights,
     desparsify,
+    embed_armature,
     match,
     panel_buttons,
     presets,
@@ -32,4 +33,5 @@ MODULES = (
     panel_buttons,
     retarget_weights,
     bone_map,
+    embed_armature,
 )

@@ -9,6 +9,9 @@ CATEGORIES = np.array(
     np.float32,
 ) / np.float32(255)
 
+# From filled in from around to copied from the source; the ends are those of inpainted and matched.
+CONFIDENCE = np.array([CATEGORIES[1], (0.94, 0.9, 0.55), CATEGORIES[0]])
+
 # No influence, then 1 to 4, then more: what riggers know from other tools.
 INFLUENCES = np.array(
     [(0.1, 0.1, 0.1), (0.85, 0.12, 0.1), (0.95, 0.5, 0.05), (0.95, 0.85, 0.1), (0.25, 0.7, 0.2), (0.15, 0.35, 0.9)],
@@ -41,6 +44,8 @@ def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
     """(V, 3) of what a preview.Picture of this kind holds."""
     if kind == "MATCH":
         return of_categories(values)
+    if kind == "CONFIDENCE":
+        return of_confidence(values)
     if kind == "FAULTS":
         return FAULTS[values]
     if kind == "DIFFERENCE":
@@ -51,6 +56,14 @@ def of_values(kind: str, values: NDArray) -> NDArray[np.float32]:
 def of_categories(category: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(V, 3) of categories (V,)."""
     return CATEGORIES[category]
+
+
+def of_confidence(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(V, 3) of confidences (V,) from 0 to 1; 2 and more stand for the categories of these numbers."""
+    steps = np.linspace(0, 1, len(CONFIDENCE))
+    graded = np.stack([np.interp(values, steps, CONFIDENCE[:, channel]) for channel in range(3)], axis=1)
+    whole = np.where(values >= 2, values, 0).astype(np.int64)
+    return np.where((values >= 2)[:, None], CATEGORIES[whole], graded).astype(np.float32)
 
 
 def of_influences(count: NDArray[np.integer]) -> NDArray[np.float32]:

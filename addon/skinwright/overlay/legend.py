@@ -13,6 +13,7 @@ from .picture import Histogram, Picture
 
 TITLES = {
     "MATCH": "Match",
+    "CONFIDENCE": "Confidence",
     "INFLUENCES": "Influences",
     "STRETCH": "Stretch",
     "DIFFERENCE": "Difference",

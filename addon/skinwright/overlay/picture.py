@@ -24,6 +24,12 @@ CATEGORY_NAMES = {
     Category.FORCED_INPAINT: "Forced to inpaint",
     Category.UNMATCHED_ISLAND: "Loose part without match",
 }
+CONFIDENCE_NAMES = {
+    1.0: "Copied from the source",
+    0.5: "Smoothed over its own gap",
+    0.0: "Filled in from around",
+}
+FORCED = (Category.FORCED_MATCH, Category.FORCED_INPAINT, Category.UNMATCHED_ISLAND)
 INFLUENCE_NAMES = ("No bone", "1 bone", "2 bones", "3 bones", "4 bones", "5 bones or more")
 HISTOGRAM_BINS = 48
 
@@ -41,7 +47,7 @@ class Histogram:
 
 @dataclass(frozen=True)
 class Picture:
-    """`values` (V,) mean what `kind` says: a category, a number of influences, a logarithm of stretch, a fault."""
+    """`values` (V,) mean what `kind` says: a category, a confidence, a number of influences, a stretch, a fault."""
 
     kind: str
     object_name: str
@@ -138,6 +144,8 @@ def _triangles_of(obj: bpy.types.Object) -> NDArray[np.uint32]:
 
 def _picture_of_match(match: Match, session: MatchSession, shape: dict) -> Picture:
     counts = match.counts()
+    if match.confidence is not None:
+        return _picture_of_confidence(match.confidence, match.category, counts, shape)
     rows = [(category, f"{name}: {counts[category]:,}") for category, name in CATEGORY_NAMES.items()]
     inpainting = session.inpainting
     histograms = [
@@ -145,6 +153,14 @@ def _picture_of_match(match: Match, session: MatchSession, shape: dict) -> Pictu
         histogram("Angle", "ROTATION", inpainting.angle, match.max_normal_angle, np.pi),
     ]
     return Picture(**shape, values=match.category, rows=rows, histograms=histograms)
+
+
+def _picture_of_confidence(confidence: NDArray, category: NDArray, counts: NDArray, shape: dict) -> Picture:
+    """A scale, and the categories that the mask or the policy decides."""
+    values = np.where(np.isin(category, FORCED), category, confidence).astype(np.float32)
+    rows: list[tuple[float, str]] = list(CONFIDENCE_NAMES.items())
+    rows += [(float(forced), f"{CATEGORY_NAMES[forced]}: {counts[forced]:,}") for forced in FORCED]
+    return Picture(**shape | {"kind": "CONFIDENCE"}, values=values, rows=rows)
 
 
 def histogram(label: str, unit: str, values: NDArray, threshold: float, high: float) -> Histogram:

@@ -27,6 +27,7 @@ class Character:
     segments: NDArray[np.float32]
     rest_bones: NDArray[np.float64]
     preserve_volume: bool
+    armature_from_mesh: NDArray[np.float64]
 
     def refiner(self, params: RefineParams) -> native.Refiner:
         """The native object, prepared. Raises native.NativeError."""
@@ -40,7 +41,16 @@ class Character:
 
     def skinned(self, pose_from_rest: NDArray[np.float64]) -> NDArray[np.float32]:
         """(V, 3) as the Armature modifier leaves them."""
-        return native.skin(self.positions, self.rows, pose_from_rest, self.rest_bones if self.preserve_volume else None)
+        return self.posed(self.positions, pose_from_rest)
+
+    def posed(self, positions: NDArray[np.float32], pose_from_rest: NDArray[np.float64]) -> NDArray[np.float32]:
+        """The same of other rest positions (V, 3). Dual quaternions blend in the armature's space, as Blender's do."""
+        if not self.preserve_volume:
+            return native.skin(positions, self.rows, pose_from_rest, None)
+        there, back = self.armature_from_mesh, np.linalg.inv(self.armature_from_mesh)
+        poses = there @ pose_from_rest @ back
+        moved = native.skin(_moved(there, positions), self.rows, poses, there @ self.rest_bones)
+        return _moved(back, moved)
 
     def lengths(self) -> NDArray[np.float64]:
         """(B,) of the bones."""
@@ -73,7 +83,13 @@ def read(obj: bpy.types.Object) -> Character:
         segments=armature.segments(obj, rig, bones),
         rest_bones=object_from_armature @ rest,
         preserve_volume=preserves_volume(obj),
+        armature_from_mesh=np.linalg.inv(object_from_armature),
     )
+
+
+def _moved(matrix: NDArray[np.float64], positions: NDArray[np.float32]) -> NDArray[np.float32]:
+    moved = np.einsum("ij,nj->ni", matrix[:3, :3], positions) + matrix[:3, 3]
+    return moved.astype(np.float32)
 
 
 def preserves_volume(obj: bpy.types.Object) -> bool:

@@ -80,7 +80,7 @@ class _Key:
 def steps(
     obj: bpy.types.Object, params: CorrectiveParams, chosen: set[str] | None = None
 ) -> "jobs.Jobs[CorrectiveReport]":
-    """Bake correctives of the chosen joints (all that skin follows if none is): nothing is written before all is solved."""
+    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved."""
     driven_keys.check(obj)
     character = characters.read(obj)
     bones = joints(character, chosen or set())
@@ -127,7 +127,7 @@ def _certify(
     """Figures of the pose as the key will show it, the left-out offsets and the damped inverse included."""
     sample, shown = key.sample, character.positions.copy()
     shown[key.vertices] += key.offsets.astype(np.float32)
-    after = native.skin(shown, character.rows, pose, character.rest_bones if character.preserve_volume else None)
+    after = character.posed(shown, pose)
     first, second = refiner.measure(pose, before), refiner.measure(pose, after)
     one, other = (_of_joint(figures, sample.bone) for figures in (first, second))
     return Certificate(

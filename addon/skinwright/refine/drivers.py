@@ -1,14 +1,14 @@
 """Expressions that give each key its value from the joint's rotation, so that keys share every pose among themselves.
 
-A swing by w about an axis between X and Z gives the keys about X and about Z the shares cos^2 and sin^2, which add up to
-one; along each direction the values are hats over the sampled angles, which add up to one as well. No pose counts twice.
-Twist is measured apart from the swing, about the bone.
+A swing by w about an axis between X and Z gives the keys about X and about Z the shares cos^2 and sin^2, which add up
+to one; along each direction the values are hats over the sampled angles, which add up to one as well. No pose counts
+twice. Twist is measured apart from the swing, about the bone.
 """
 
 from .sampling import Sample
 
-# Variables of an expression: rotation channels of the bone against rest, swing and twist about Y apart. W is the angle of
-# the whole swing; X and Z are twice the arc sine of its quaternion's parts; Y is the angle of the twist. All in radians.
+# Variables of an expression: rotation channels of the bone against rest, swing and twist about Y apart. W is the angle
+# of the whole swing; X and Z are twice the arc sine of its quaternion's parts; Y is the angle of the twist. Radians.
 CHANNELS = {"w": "ROT_W", "x": "ROT_X", "z": "ROT_Z", "t": "ROT_Y"}
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .. import native
 from .character import Character
 
-# Garments take all of the body's offset up to this share of the body's diagonal away, and nothing from three times that.
+# Garments take all of the body's offset up to this share of its diagonal away, and nothing from three times that.
 _NEAR = 0.02
 
 
@@ -29,7 +29,7 @@ class Follower:
 def follow(body: Character, garment: Character, body_from_garment: NDArray[np.float64]) -> Follower:
     """Hang a garment on the body's rest surface. Raises native.NativeError."""
     places = garment.positions @ body_from_garment[:3, :3].T + body_from_garment[:3, 3]
-    triangle, distance, shares = native.closest(
+    triangle, shares, distance = native.closest(
         body.name, body.positions, body.triangles, body.rows, len(body.bones), places.astype(np.float32)
     )
     diagonal = float(np.linalg.norm(np.ptp(body.positions, axis=0)))

@@ -53,7 +53,7 @@ def stop() -> None:
 
 
 def update() -> bool:
-    """Refine the present pose if it is another one; whether anything was done. Ends the preview where an object is gone."""
+    """Refine the present pose if it is another one; whether anything was done. Ends if an object is gone."""
     live = current
     if live is None:
         return False

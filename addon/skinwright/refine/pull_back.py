@@ -56,7 +56,7 @@ def blend(share: NDArray[np.float64], turned: NDArray[np.float64], by_quaternion
 
 
 def inverse(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) inverses; those of matrices that have nearly collapsed are damped (Tikhonov), else spikes would grow."""
+    """(n, 3, 3) inverses; those of nearly collapsed matrices are damped (Tikhonov), else spikes would grow."""
     result = np.empty_like(matrices)
     collapsed = np.abs(np.linalg.det(matrices)) < COLLAPSED
     result[~collapsed] = np.linalg.inv(matrices[~collapsed])

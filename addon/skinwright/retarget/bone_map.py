@@ -1,4 +1,4 @@
-"""Which bone of the source is which of the target: by name, convention, and place in hierarchy and body."""
+"""Which bone of the source is which of the target: by name, by convention, by place in hierarchy and body."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from ..scene.rest_bones import RestBones
 from . import bone_names
+
+# How a partner was found, how sure that is, and what two names must have in common.
+Rule = tuple[str, float, Callable[[list[str]], dict[str, object]]]
 
 # Farther apart than this share of the skeleton's size, bones of unknown names are not one.
 REACH = 0.12
@@ -27,17 +30,32 @@ def match(source: RestBones, target: RestBones, given: Mapping[str, str] | None 
     """One entry per bone of the target, in its order. `given` entries win and are taken as they are."""
     given = given or {}
     found = {name: BoneMatch(name, given[name], "given", 1.0) for name in target.names if name in given}
-    rules: list[tuple[str, float, Callable[[list[str]], dict[str, object]]]] = [
-        ("name", 1.0, lambda names: {name: name for name in names}),
-        ("name", 0.95, lambda names: {name: (bone_names.plain(name)) for name in names}),
-        ("name", 0.9, lambda names: {n: (bone_names.without_side(n), bone_names.side(n)) for n in names}),
-        ("convention", 0.85, lambda names: dict(bone_names.vocabulary(names))),
-    ]
-    for how, confidence, key in rules:
+    for how, confidence, key in _rules(source.names, target.names):
         _match_by_key(source.names, target.names, found, how, confidence, key)
     _match_by_place(source, target, found)
     nothing = "no partner"
     return [found.get(name, BoneMatch(name, "", nothing, 0.0)) for name in target.names]
+
+
+def _rules(source: list[str], target: list[str]) -> list[Rule]:
+    """What pairs of names are looked for, the surest first.
+
+    Two rigs of different conventions may call different bones by one name (Mixamo's first spine bone is `Spine`,
+    Rigify's hips are `spine`), so there the conventions decide.
+    """
+    meanings = [bone_names.vocabulary(names) for names in (source, target)]
+    differ = all(meanings) and bone_names.convention(source) != bone_names.convention(target)
+    known = set(meanings[0]) | set(meanings[1]) if differ else set()
+
+    def unknown(names: list[str]) -> list[str]:
+        return [name for name in names if name not in known]
+
+    by_name: list[Rule] = [
+        ("name", 1.0, lambda names: {name: name for name in unknown(names)}),
+        ("name", 0.95, lambda names: {name: bone_names.plain(name) for name in unknown(names)}),
+        ("name", 0.9, lambda names: {n: (bone_names.without_side(n), bone_names.side(n)) for n in unknown(names)}),
+    ]
+    return [*by_name, ("convention", 0.85, lambda names: dict(bone_names.vocabulary(names)))]
 
 
 def _match_by_key(

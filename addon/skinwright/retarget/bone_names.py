@@ -133,7 +133,7 @@ def plain(name: str) -> str:
 
 
 def side(name: str) -> str:
-    """Return L, R, or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
+    """The letter L or R, or nothing for the middle: by `.L`, `_l`, `Left`, `L_`, `lShldr`, or the MMD characters."""
     bare = _PREFIX.sub("", unicodedata.normalize("NFKC", name))
     if bare[:1] in "左右":
         return _SIDES[bare[0]]

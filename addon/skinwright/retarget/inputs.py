@@ -54,7 +54,8 @@ def read_pair(
     taker = _target(targets)
     if giver.armature == taker.armature:
         raise SceneError(
-            f"{giver.armature.name} deforms both source and target: use Transfer Weights between meshes of one armature"
+            f"{giver.armature.name} deforms the source and the target: use Transfer Weights between meshes of "
+            "one armature"
         )
     for obj in targets:
         sculpting.check_editable(obj)
@@ -70,7 +71,7 @@ def read_pair(
 
 def match_bones(source: RestBones, target: RestBones, params: RetargetParams) -> list[BoneMatch]:
     """By the map of `params`, then by name and place. Raises SceneError for a name that is no bone."""
-    for name, partner in params.bone_map.items():
+    for name, partner in (params.bone_map or {}).items():
         for bone, bones, whose in ((name, target, "target"), (partner, source, "source")):
             if bone and bone not in bones.names:
                 raise SceneError(f"The bone map names {bone}, but the {whose} has no deforming bone of that name")
@@ -112,29 +113,31 @@ def _target(targets: Sequence[bpy.types.Object]) -> Character:
 
 
 def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:
-    read = [mesh.read(obj) for obj in meshes]
-    starts = np.cumsum([0, *(len(geometry.positions) for geometry in read)], dtype=np.int64).tolist()
-    return Character(
-        armature=rig,
-        bones=rest_bones_of(rig),
-        meshes=meshes,
-        positions=np.concatenate([geometry.positions for geometry in read]),
-        triangles=np.concatenate(
-            [geometry.triangles + np.uint32(start) for geometry, start in zip(read, starts[:-1], strict=True)]
-        ),
-        starts=starts,
-    )
+    positions, triangles, starts = joined([mesh.read(obj) for obj in meshes])
+    return Character(rig, rest_bones_of(rig), meshes, positions, triangles, starts)
 
 
-def _rows(source: Character) -> Rows:
-    parts = [vertex_groups.read(obj, source.bones.names) for obj in source.meshes]
+def joined(parts: list[mesh.Geometry]) -> tuple[NDArray[np.float32], NDArray[np.uint32], list[int]]:
+    """Positions and triangles of all parts as one mesh, and where each part's vertices start."""
+    starts = np.cumsum([0, *(len(part.positions) for part in parts)], dtype=np.int64).tolist()
+    moved = [part.triangles + np.uint32(start) for part, start in zip(parts, starts[:-1], strict=True)]
+    return np.concatenate([part.positions for part in parts]), np.concatenate(moved), starts
+
+
+def joined_rows(meshes: Sequence[bpy.types.Object], names: Sequence[str]) -> Rows:
+    """The rows of all meshes over the groups `names`, one after another."""
+    parts = [vertex_groups.read(obj, names) for obj in meshes]
     offsets = np.cumsum([0, *(len(part.bones) for part in parts)], dtype=np.int64)
     indptr = [part.indptr[1:] + np.uint32(start) for part, start in zip(parts, offsets, strict=False)]
-    rows = Rows(
+    return Rows(
         np.concatenate([np.zeros(1, np.uint32), *indptr]),
         np.concatenate([part.bones for part in parts]),
         np.concatenate([part.values for part in parts]),
     )
+
+
+def _rows(source: Character) -> Rows:
+    rows = joined_rows(source.meshes, source.bones.names)
     if not csr.row_sums(rows).any():
         names = ", ".join(obj.name for obj in source.meshes)
         raise SceneError(f"{names}: no vertex follows a deforming bone of {source.armature.name}; paint weights first")

@@ -1,8 +1,7 @@
 """The settings of a retargeting as plain values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from .. import declared
@@ -16,7 +15,7 @@ Landmark = tuple[str, int, str, int]
 
 @dataclass(frozen=True)
 class RetargetParams(Params):
-    """`bone_map` names the source's bone for bones of the target ("" for none); others are matched by name and place.
+    """`bone_map` names the source's bone for bones of the target ("" for none); the others are matched automatically.
 
     `landmarks` are used by the Biharmonic method, beside those that the bones give.
     """
@@ -28,7 +27,7 @@ class RetargetParams(Params):
         choices={
             "skeleton": (
                 "Skeleton",
-                "Bring the target into the source's pose and proportions, then match the surfaces",
+                "Bring the target into the source's pose and proportions, then match surfaces",
             ),
             "biharmonic": ("Biharmonic", "Match by distances along the surface to landmarks beside the joints"),
         },
@@ -76,7 +75,7 @@ class RetargetParams(Params):
         "Store the place that each vertex was matched to as the color attribute Correspondence on both characters",
     )
     threads: int = threads()
-    bone_map: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    bone_map: Mapping[str, str] | None = None
     landmarks: tuple[Landmark, ...] = ()
 
 
@@ -99,5 +98,5 @@ def from_json(values: Any) -> RetargetParams:
 
 def to_json(params: RetargetParams) -> dict[str, Any]:
     """The inverse of `from_json`."""
-    lists = {"bone_map": dict(params.bone_map), "landmarks": [list(entry) for entry in params.landmarks]}
+    lists = {"bone_map": dict(params.bone_map or {}), "landmarks": [list(entry) for entry in params.landmarks]}
     return declared.to_json(params) | lists

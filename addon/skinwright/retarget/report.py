@@ -26,7 +26,8 @@ class RetargetReport:
         """The line the artist reads when it is done."""
         paired = sum(bool(entry["source"]) for entry in self.bone_map)
         return (
-            f"{self.source} to {self.target}: {self.matched} of {self.vertices} matched, {self.filled} filled; "
+            f"{self.source} to {self.target}: {self.matched} of {self.vertices} vertices matched, "
+            f"{self.filled} filled; "
             f"{paired} of {len(self.bone_map)} bones have a partner; {sum(self.seconds.values()):.2f} s"
         )
 

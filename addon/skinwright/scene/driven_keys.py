@@ -43,8 +43,10 @@ def add(
 def drive(
     key: bpy.types.ShapeKey, armature: bpy.types.Object, bone: str, expression: str, channels: dict[str, str]
 ) -> None:
-    """Let `key` have the value of `expression`; its variables are channels of the bone's rotation against rest, the twist
-    about Y apart from the swing."""
+    """Let `key` have the value of `expression`.
+
+    Its variables are channels of the bone's rotation against rest, the twist about Y apart from the swing.
+    """
     driver = key.driver_add("value").driver
     driver.type = "SCRIPTED"
     for letter, channel in channels.items():

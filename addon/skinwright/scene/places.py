@@ -22,6 +22,13 @@ def coincident(a: NDArray[np.float32], b: NDArray[np.float32], tolerance: float)
     return found
 
 
+def numbers(positions: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(V,) the same number for points (V, 3) of equal coordinates, counted from 0."""
+    bits = np.ascontiguousarray(positions + np.float32(0)).view(np.uint32).astype(np.int64)  # -0 is 0
+    keys = ((bits * _PRIMES) ^ (bits >> 7)).sum(axis=1, dtype=np.int64)
+    return np.unique(keys, return_inverse=True)[1].reshape(-1)
+
+
 def first_at_each(positions: NDArray[np.float32], tolerance: float) -> NDArray[np.int64]:
     """(V,) for each point one of those at its place, the same for all of them."""
     near = coincident(positions, positions, tolerance)

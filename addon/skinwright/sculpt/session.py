@@ -250,15 +250,14 @@ class SculptSession:
         The solver has one rest shape. The difference d of this pose's adds T(w) d, which is taken off the targets for
         the weights w of the pass before; where d is small against the body, few passes are enough.
         """
-        here = shape_keys.mixed(obj, self._basis)[vertices]
-        usual = self._mixed[vertices]
-        wanted = targets
-        for _ in range(_PASSES if np.abs(here - usual).max(initial=0) > self._shape.rounding else 1):
+        here, usual = shape_keys.mixed(obj, self._basis)[vertices], self._mixed[vertices]
+        if np.abs(here - usual).max(initial=0) <= self._shape.rounding:
+            return self._solver.stroke(vertices, targets)[1]
+        for number in range(_PASSES):
             added = self._solver.posed(vertices, here) - self._solver.posed(vertices, usual)
-            if wanted is not targets:
+            if number:
                 self._solver.undo()
-            wanted = (targets - added).astype(np.float32)
-            _, reachability, _ = self._solver.stroke(vertices, wanted)
+            reachability = self._solver.stroke(vertices, (targets - added).astype(np.float32))[1]
         return reachability
 
     def _guard_joints(self, obj: bpy.types.Object, vertices: NDArray) -> None:

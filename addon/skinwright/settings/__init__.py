@@ -4,6 +4,7 @@ import bpy
 from bpy.props import PointerProperty
 from bpy.types import Object, PropertyGroup, Scene
 
+from .embed import SKINWRIGHT_PG_embed
 from .overlay import SKINWRIGHT_PG_overlay
 from .refine import SKINWRIGHT_PG_refine
 from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
@@ -22,6 +23,7 @@ class SKINWRIGHT_PG_scene(PropertyGroup):
     sculpt: PointerProperty(type=SKINWRIGHT_PG_sculpt)
     refine: PointerProperty(type=SKINWRIGHT_PG_refine)
     retarget: PointerProperty(type=SKINWRIGHT_PG_retarget)
+    embed: PointerProperty(type=SKINWRIGHT_PG_embed)
 
 
 CLASSES = (
@@ -32,6 +34,7 @@ CLASSES = (
     SKINWRIGHT_PG_refine,
     SKINWRIGHT_PG_bone_pair,
     SKINWRIGHT_PG_retarget,
+    SKINWRIGHT_PG_embed,
     SKINWRIGHT_PG_scene,
 )
 

@@ -35,6 +35,10 @@ class TransferSettings:
         layout.prop(self, "geometry")
         layout.prop(self, "join_borders")
         layout.prop(self, "relative_weld_tolerance")
+        layout.prop(self, "method")
+        if self.method == "CONFIDENCE":
+            layout.prop(self, "softness")
+            return
         self._draw_length(layout, "distance_mode", "relative_max_distance", "max_distance")
         layout.prop(self, "max_normal_angle")
         layout.prop(self, "match_flipped_normals")
@@ -43,6 +47,7 @@ class TransferSettings:
         """The solve, loose parts, smoothing."""
         self._draw_length(layout, "smoothness_mode", "relative_smoothness_length", "smoothness_length")
         layout.prop(self, "island_policy")
+        layout.prop(self, "small_islands")
         layout.prop(self, "smoothing_iterations")
         column = layout.column()
         column.active = self.smoothing_iterations > 0

@@ -90,8 +90,9 @@ def _completed(target: bpy.types.Object, shape: shapes.Shape, body: Body, params
     reflections = [] if sides.unflippable(body.opposite) else mirror.reflections(target, shape.matrix)
     done = completion.complete(shape.geometry, reflections)
     if params.symmetrize:
-        plane = (body.armature or body.object).matrix_world
-        done = completion.symmetrised(done, symmetry.opposite_vertices(shape.geometry.positions, plane))
+        to_middle = np.linalg.inv(np.array((body.armature or body.object).matrix_world))
+        across = mesh.transformed(shape.geometry.positions, to_middle)
+        done = completion.symmetrised(done, symmetry.partners(across))
     return done
 
 

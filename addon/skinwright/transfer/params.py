@@ -11,6 +11,8 @@ Groups = Literal["BONE_DEFORM", "BONE_SELECT", "ALL", "ACTIVE"]
 Geometry = Literal["AS_SHOWN", "REST", "CURRENT"]
 SourceScope = Literal["PARTS", "OBJECT", "ARMATURE", "COLLECTION"]
 IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
+Method = Literal["paper", "confidence"]
+SmallIslands = Literal["auto", "rigid", "solved"]
 Reading = Literal["STEER", "PAINTED"]
 
 
@@ -78,6 +80,31 @@ class TransferParams(Params):
             ),
         },
     )
+    method: Method = setting(
+        "paper",
+        "Method",
+        "How vertices take weights from the source",
+        choices={
+            "paper": (
+                "Match or Inpaint",
+                "Copy where distance and angle are within their thresholds, fill in the rest",
+            ),
+            "confidence": ("Confidence", "Trust the weights of each vertex's point less the larger gap and tilt are"),
+        },
+        native=True,
+    )
+    softness: float = setting(
+        0.7,
+        "Softness",
+        "How far weights are smoothed, as a multiple of the gap between garment and source",
+        least=0.05,
+        most=10,
+        soft_least=0.35,
+        soft_most=1.4,
+        precision=2,
+        step=5,
+        native=True,
+    )
     max_distance: float | None = setting(
         None,
         "Distance",
@@ -116,7 +143,7 @@ class TransferParams(Params):
         1e-6,
         "Weld",
         "Vertices closer than this part of the target's diagonal are one, as at seams of imported files; 0 for none",
-        most=0.1,
+        most=0.01,
         soft_most=1e-3,
         precision=6,
         step=0.01,
@@ -152,6 +179,17 @@ class TransferParams(Params):
             "nearest": ("Nearest", "Give each vertex the weights of its closest point on the source"),
             "rigid": ("Rigid", "Give the whole part one set of weights, for buckles and plates"),
             "skip": ("Skip", "Leave the part as it is"),
+        },
+        native=True,
+    )
+    small_islands: SmallIslands = setting(
+        "auto",
+        "Small Parts",
+        "What to do with small loose parts that hang off the source, such as buttons and pouches",
+        choices={
+            "auto": ("Automatic", "Rigid with Confidence, as computed otherwise"),
+            "rigid": ("Rigid", "Give each part one set of weights if it nearly has one"),
+            "solved": ("As Computed", "Leave them as they are computed"),
         },
         native=True,
     )

@@ -1,6 +1,7 @@
 """What belongs together: meshes whose borders lie on each other. Numpy on world positions."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from .. import csr
 from ..csr import Rows
 from ..scene.mesh import Geometry
-from ..scene.places import coincident
+from ..scene.places import coincident, numbers
 
 # Of the diagonal; single precision leaves that much where objects have places of their own.
 _TOLERANCE = 1e-6
@@ -20,9 +21,9 @@ _FEWEST = 3
 def groups(geometries: Sequence[Geometry]) -> list[list[int]]:
     """The numbers of geometries that continue one another, directly or by others; each once."""
     root = list(range(len(geometries)))
-    borders = [border(geometry) for geometry in geometries]
+    border_of = cache(lambda number: border(geometries[number]))
     for a, b in combinations(range(len(geometries)), 2):
-        if _root(root, a) != _root(root, b) and continues(geometries[a], borders[a], geometries[b], borders[b]):
+        if _root(root, a) != _root(root, b) and _continue(geometries, border_of, a, b):
             root[_root(root, b)] = _root(root, a)
     found: dict[int, list[int]] = {}
     for number in range(len(geometries)):
@@ -36,15 +37,18 @@ def _root(root: list[int], number: int) -> int:
     return number
 
 
-def continues(a: Geometry, border_a: NDArray[np.bool_], b: Geometry, border_b: NDArray[np.bool_]) -> bool:
-    """Whether they share border points (V,) and hardly any others: a copy of the same surface does not continue it."""
-    (low_a, high_a), (low_b, high_b) = a.bounds, b.bounds
-    tolerance = _tolerance(a, b)
+def _continue(geometries: Sequence[Geometry], border_of: Callable[[int], NDArray[np.bool_]], a: int, b: int) -> bool:
+    """Whether two share border points and hardly any others: a copy of the same surface does not continue it."""
+    one, other = geometries[a], geometries[b]
+    (low_a, high_a), (low_b, high_b) = one.bounds, other.bounds
+    tolerance = _tolerance(one, other)
     if (np.maximum(low_a - high_b, low_b - high_a) > tolerance).any():
         return False
-    twin = coincident(a.positions, b.positions, tolerance)
+    twin = coincident(one.positions, other.positions, tolerance)
     shared = twin >= 0
-    both = shared & border_b & border_a[twin]
+    if shared.sum() < _FEWEST:
+        return False
+    both = shared & border_of(b) & border_of(a)[twin]
     return int(both.sum()) >= _FEWEST and int((shared & ~both).sum()) <= 0.1 * both.sum()
 
 
@@ -56,8 +60,7 @@ def _tolerance(a: Geometry, b: Geometry) -> float:
 
 def border(geometry: Geometry) -> NDArray[np.bool_]:
     """(V,) the vertices on edges of one face only, once vertices at one place are counted as one."""
-    _, same = np.unique(geometry.positions, axis=0, return_inverse=True)
-    same = same.reshape(-1)
+    same = numbers(geometry.positions)
     corners = same[geometry.triangles.astype(np.int64)]
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
     keys, count = np.unique(edges[:, 0] * np.int64(len(same)) + edges[:, 1], return_counts=True)

@@ -75,6 +75,21 @@ class SKINWRIGHT_PT_retarget_bones(Tab, Panel):
         row.operator("skinwright.bone_map_save", text="Save", icon="EXPORT")
 
 
+class SKINWRIGHT_PT_embed(Tab, Panel):
+    """An armature for a mesh that has none."""
+
+    bl_label = "Embed Armature"
+    bl_parent_id = "SKINWRIGHT_PT_retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        """The source is that of retargeting."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        context.scene.skinwright.embed.draw_settings(self.layout)
+        self.layout.operator("skinwright.embed_armature", icon="OUTLINER_OB_ARMATURE")
+
+
 class SKINWRIGHT_PT_retarget_settings(Tab, Panel):
     """How vertices are matched and rows written."""
 
@@ -94,4 +109,5 @@ register, unregister = registration(
     SKINWRIGHT_PT_retarget,
     SKINWRIGHT_PT_retarget_bones,
     SKINWRIGHT_PT_retarget_settings,
+    SKINWRIGHT_PT_embed,
 )

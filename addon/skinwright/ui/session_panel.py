@@ -37,7 +37,11 @@ class SKINWRIGHT_PT_session(Tab, Panel):
 def _draw_sculpting(layout: UILayout, context: Context, session: SculptSession) -> None:
     _draw_ends(layout, "skinwright.end_sculpt_weights")
     column = layout.column(align=True)
-    column.label(text=f"{session.target_name}: {session.stroke_count} strokes, {session.pose_count} poses")
+    strokes, poses = (
+        f"{count} {what}{'s' * (count != 1)}"
+        for count, what in ((session.stroke_count, "stroke"), (session.pose_count, "pose"))
+    )
+    column.label(text=f"{session.target_name}: {strokes}, {poses}")
     if session.reachability is None:
         return
     column.progress(factor=max(session.reachability, 0), text=f"{session.reachability:.0%} of the sculpt reached")

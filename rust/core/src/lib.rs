@@ -18,6 +18,7 @@ pub mod mesh;
 pub mod penetration;
 pub mod progress;
 pub mod refine;
+mod registration;
 pub mod retarget;
 pub mod sculpt;
 pub mod skinning;

@@ -4,7 +4,8 @@ mod common;
 
 use common::{Fixture, Row, body, button, degenerate, rigid_motion, skirt};
 use skinwright_core::transfer::{
-    Inpainting, IslandPolicy, Length, MaskValue, Settings, Source, TargetMesh, Transfer, transfer_weights,
+    Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, TargetMesh, Transfer,
+    transfer_weights,
 };
 use skinwright_core::{Error, Progress, Weights};
 
@@ -61,9 +62,18 @@ fn every_degenerate_mesh_gets_proper_rows_under_every_policy() {
     let source = source();
     for target in degenerate() {
         for island_policy in IslandPolicy::ALL {
-            for smoothness_length in [Length::Relative(0.05), Length::Absolute(0.0)] {
-                let settings =
-                    Settings { island_policy, smoothness_length, smoothing_iterations: 2, ..Settings::default() };
+            let energies = [Length::Relative(0.05), Length::Absolute(0.0)].map(|l| (MatchMethod::ClosestPoint, l));
+            for (method, smoothness_length) in energies.into_iter().chain([(MatchMethod::Confidence, energies[0].1)]) {
+                let small_islands = SmallIslands::Rigid;
+                let smoothing_iterations = 2;
+                let settings = Settings {
+                    method,
+                    island_policy,
+                    small_islands,
+                    smoothness_length,
+                    smoothing_iterations,
+                    ..Settings::default()
+                };
                 let result = transfer(&source, &target, &settings);
                 assert_eq!(result.weights.vertex_count(), target.positions.len());
                 for i in 0..target.positions.len() {

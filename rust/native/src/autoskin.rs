@@ -11,6 +11,7 @@ use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::desparsify::segments;
 use crate::error::{InvalidParameter, enter, to_python};
 use crate::job::Job;
+use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
 
@@ -53,7 +54,7 @@ pub fn automatic_weights(
     max_influences: usize,
     resolution: f64,
     stiffness: f64,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<AutoWeights> {
     let settings = settings(method, max_influences, resolution, stiffness)?;
     let input = input(&positions, &triangles, &bone_segments, &bone_parents, settings)?;
@@ -75,7 +76,7 @@ pub fn start_automatic_weights(
     max_influences: usize,
     resolution: f64,
     stiffness: f64,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Job> {
     let settings = settings(method, max_influences, resolution, stiffness)?;
     let input = Arc::new(input(&positions, &triangles, &bone_segments, &bone_parents, settings)?);

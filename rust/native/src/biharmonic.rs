@@ -7,6 +7,7 @@ use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, triples};
 use crate::error::enter;
+use crate::ranges;
 
 /// Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance, each island by itself.
 #[pyfunction]
@@ -15,8 +16,8 @@ pub fn biharmonic_embedding<'py>(
     py: Python<'py>,
     positions: Matrix<'_, f32>,
     triangles: Matrix<'_, u32>,
-    n_pairs: usize,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::pairs)] n_pairs: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
     let embedding = enter(py, threads, || {

@@ -1,14 +1,16 @@
 //! `embed_skeleton`.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use skinwright_core::embed::{self as core, Method, Template};
+use skinwright_core::embed::{self as core, Donor, Method, Template};
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::ranges;
+use crate::weights::Weights;
 
 /// A skeleton embedded into a mesh.
 #[pyclass(frozen, get_all, module = "skinwright_native")]
@@ -27,6 +29,44 @@ struct Input {
     tails: Vec<[f32; 3]>,
     parents: Vec<i32>,
     method: Method,
+    donor: Option<DonorInput>,
+}
+
+/// The character that the bones were made for.
+struct DonorInput {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    weights: skinwright_core::Weights,
+    mirror: Option<Vec<i32>>,
+    landmarks: Vec<[u32; 2]>,
+}
+
+impl DonorInput {
+    /// Mesh and weights belong together; None if there is neither.
+    fn new(
+        py: Python<'_>,
+        mesh: Option<(Matrix<'_, f32>, Matrix<'_, u32>)>,
+        weights: Option<&Weights>,
+        mirror: Option<Vector<'_, i32>>,
+        landmarks: Option<Matrix<'_, u32>>,
+    ) -> PyResult<Option<Self>> {
+        let (Some((positions, triangles)), Some(weights)) = (mesh, weights) else { return Ok(None) };
+        Ok(Some(Self {
+            positions: triples(&positions, "donor_positions")?,
+            triangles: triples(&triangles, "donor_triangles")?,
+            weights: weights.to_core(py)?,
+            mirror: mirror.map(|mirror| entries(&mirror)),
+            landmarks: landmarks.map(|pairs| vertex_pairs(&pairs)).transpose()?.unwrap_or_default(),
+        }))
+    }
+}
+
+/// (L, 2).
+fn vertex_pairs(array: &Matrix<'_, u32>) -> PyResult<Vec<[u32; 2]>> {
+    let &[_, 2] = array.shape() else {
+        return Err(InvalidParameter::new_err(format!("landmarks must have shape (L, 2), not {:?}", array.shape())));
+    };
+    Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect())
 }
 
 impl Input {
@@ -37,6 +77,7 @@ impl Input {
         tails: &Matrix<'_, f32>,
         parents: &Vector<'_, i32>,
         method: &str,
+        donor: Option<DonorInput>,
     ) -> PyResult<Self> {
         Ok(Self {
             positions: triples(positions, "positions")?,
@@ -45,19 +86,30 @@ impl Input {
             tails: triples(tails, "template_tails")?,
             parents: entries(parents),
             method: method_of(method)?,
+            donor,
         })
     }
 
     fn run(&self, progress: &Progress) -> skinwright_core::Result<core::Embedding> {
         let mesh = TriMesh::new(&self.positions, &self.triangles, "rest")?;
         let template = Template { heads: &self.heads, tails: &self.tails, parents: &self.parents };
-        core::embed_skeleton(&mesh, &template, self.method, progress)
+        let Some(donor) = self.donor.as_ref().filter(|_| self.method == Method::Template) else {
+            return core::embed_skeleton(&mesh, &template, self.method, progress);
+        };
+        let donor = Donor {
+            mesh: TriMesh::new(&donor.positions, &donor.triangles, "template")?,
+            weights: &donor.weights,
+            mirror: donor.mirror.as_deref(),
+            landmarks: &donor.landmarks,
+        };
+        core::embed_from_character(&mesh, &template, &donor, progress)
     }
 }
 
 /// Puts the bones of a template into a mesh that has none.
 #[pyfunction]
-#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0))]
+#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0,
+    donor_positions=None, donor_triangles=None, donor_weights=None, mirror=None, landmarks=None))]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
 pub fn embed_skeleton(
     py: Python<'_>,
@@ -67,26 +119,41 @@ pub fn embed_skeleton(
     template_tails: Matrix<'_, f32>,
     parents: Vector<'_, i32>,
     method: &str,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
+    donor_positions: Option<Matrix<'_, f32>>,
+    donor_triangles: Option<Matrix<'_, u32>>,
+    donor_weights: Option<&Weights>,
+    mirror: Option<Vector<'_, i32>>,
+    landmarks: Option<Matrix<'_, u32>>,
 ) -> PyResult<Embedding> {
-    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method)?;
+    let donor = DonorInput::new(py, donor_positions.zip(donor_triangles), donor_weights, mirror, landmarks)?;
+    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method, donor)?;
     let result = enter(py, threads, || input.run(&Progress::default()))?;
     present(py, result)
 }
 
 /// The same on threads of its own, to be polled.
 #[pyfunction]
-#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0))]
+#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0,
+    donor_positions=None, donor_triangles=None, donor_weights=None, mirror=None, landmarks=None))]
+#[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
 pub fn start_embed_skeleton(
+    py: Python<'_>,
     positions: Matrix<'_, f32>,
     triangles: Matrix<'_, u32>,
     template_heads: Matrix<'_, f32>,
     template_tails: Matrix<'_, f32>,
     parents: Vector<'_, i32>,
     method: &str,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
+    donor_positions: Option<Matrix<'_, f32>>,
+    donor_triangles: Option<Matrix<'_, u32>>,
+    donor_weights: Option<&Weights>,
+    mirror: Option<Vector<'_, i32>>,
+    landmarks: Option<Matrix<'_, u32>>,
 ) -> PyResult<Job> {
-    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method)?;
+    let donor = DonorInput::new(py, donor_positions.zip(donor_triangles), donor_weights, mirror, landmarks)?;
+    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method, donor)?;
     let work = move |progress: &Progress| input.run(progress);
     Job::start(threads, work, |py, result| Ok(Py::new(py, present(py, result)?)?.into_any()))
 }
@@ -94,6 +161,7 @@ pub fn start_embed_skeleton(
 fn method_name(method: Method) -> &'static str {
     match method {
         Method::Medial => "medial",
+        Method::Template => "template",
     }
 }
 

@@ -129,6 +129,18 @@ impl Inpainting {
         Ok(PyArray1::from_vec(py, matched))
     }
 
+    /// How far the row that each vertex takes from the source is trusted (V,), 0 to 1; nothing is solved.
+    #[pyo3(signature = (**settings))]
+    fn confidence<'py>(
+        &self,
+        py: Python<'py>,
+        settings: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (settings, mask) = keywords(settings)?;
+        let confidence = self.enter(py, |inpainting| inpainting.confidence(mask.as_deref(), &settings))?;
+        Ok(PyArray1::from_vec(py, confidence))
+    }
+
     /// Solves under these settings, factoring only the blocks that changed.
     #[pyo3(signature = (**settings))]
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {

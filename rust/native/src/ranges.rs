@@ -58,6 +58,11 @@ pub fn passes(object: &Bound<'_, PyAny>) -> PyResult<usize> {
     count("passes", whole(object)?, 1..=100)
 }
 
+/// Eigenpairs of a surface: what is allocated grows with them.
+pub fn pairs(object: &Bound<'_, PyAny>) -> PyResult<usize> {
+    count("n_pairs", whole(object)?, 1..=2000)
+}
+
 /// Rounds of an alternation.
 pub fn rounds(object: &Bound<'_, PyAny>) -> PyResult<usize> {
     count("rounds", whole(object)?, 0..=1000)

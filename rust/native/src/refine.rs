@@ -12,6 +12,7 @@ use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
 
@@ -52,7 +53,7 @@ impl Refiner {
         bind: f64,
         energy: f64,
         self_collision: bool,
-        threads: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
         let (positions, triangles) = (triples(&rest_positions, "rest_positions")?, triples(&triangles, "triangles")?);
         let (weights, parents) = (weights.to_core(py)?, entries(&bone_parents));
@@ -164,7 +165,7 @@ pub fn intersecting_pairs<'py>(
     py: Python<'py>,
     positions: Matrix<'py, f32>,
     triangles: Matrix<'py, u32>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
     let find = || {

@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::ranges;
 use crate::skinning::{Stack, vectors};
 use crate::weights::Weights;
 
@@ -27,8 +28,8 @@ struct Inputs {
     source: Owned,
     target: Owned,
     weights: skinwright_core::Weights,
-    bone_map: Vec<i64>,
-    source_parents: Option<Vec<i64>>,
+    bone_map: Vec<i32>,
+    source_parents: Option<Vec<i32>>,
     landmarks: Vec<Landmark>,
     settings: Settings,
 }
@@ -84,12 +85,12 @@ macro_rules! retarget_function {
             target_triangles: Matrix<'_, u32>,
             target_frames: Stack<'_, f64>,
             target_lengths: Vector<'_, f64>,
-            bone_map: Vector<'_, i64>,
+            bone_map: Vector<'_, i32>,
             method: &str,
             landmarks: Option<Matrix<'_, u32>>,
             max_influences: usize,
-            threads: usize,
-            source_parents: Option<Vector<'_, i64>>,
+            #[pyo3(from_py_with = ranges::threads)] threads: usize,
+            source_parents: Option<Vector<'_, i32>>,
             match_points: &str,
             registration: bool,
             normal_length: f64,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, Settings};
+use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands};
 
 use crate::arrays::{Vector, entries};
 use crate::error::{InvalidParameter, to_python};
@@ -21,10 +21,28 @@ pub(crate) fn policy_name(policy: IslandPolicy) -> &'static str {
     }
 }
 
-fn policy(name: &str) -> PyResult<IslandPolicy> {
-    IslandPolicy::ALL.into_iter().find(|&policy| policy_name(policy) == name).ok_or_else(|| {
-        let names = IslandPolicy::ALL.map(policy_name).join(", ");
-        InvalidParameter::new_err(format!("island_policy is {name:?}, but must be one of {names}"))
+/// The names Python uses for the methods of matching.
+fn method_name(method: MatchMethod) -> &'static str {
+    match method {
+        MatchMethod::ClosestPoint => "paper",
+        MatchMethod::Confidence => "confidence",
+    }
+}
+
+/// The names Python uses for what small islands become.
+fn small_islands_name(choice: SmallIslands) -> &'static str {
+    match choice {
+        SmallIslands::Auto => "auto",
+        SmallIslands::Rigid => "rigid",
+        SmallIslands::Solved => "solved",
+    }
+}
+
+/// The variant whose name is `value`, of all there are.
+fn named<T: Copy, const N: usize>(setting: &str, value: &str, all: [T; N], name: fn(T) -> &'static str) -> PyResult<T> {
+    all.into_iter().find(|&variant| name(variant) == value).ok_or_else(|| {
+        let names = all.map(name).join(", ");
+        InvalidParameter::new_err(format!("{setting} is {value:?}, but must be one of {names}"))
     })
 }
 
@@ -46,7 +64,14 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "smoothing_iterations" => settings.smoothing_iterations = count(name, whole(&value)?, 0..=1000)? as u32,
             "smoothing_factor" => settings.smoothing_factor = share(name, &value, 1.0)?,
             "max_influences" => settings.max_influences = count(name, whole(&value)?, 0..=255)?,
-            "island_policy" => settings.island_policy = policy(value.extract()?)?,
+            "method" => settings.method = named(name, value.extract()?, MatchMethod::ALL, method_name)?,
+            "softness" => settings.softness = within(name, value.extract()?, 0.05..=10.0)?,
+            "island_policy" => {
+                settings.island_policy = named(name, value.extract()?, IslandPolicy::ALL, policy_name)?;
+            }
+            "small_islands" => {
+                settings.small_islands = named(name, value.extract()?, SmallIslands::ALL, small_islands_name)?;
+            }
             unknown => return Err(PyTypeError::new_err(format!("there is no setting named {unknown:?}"))),
         }
     }

@@ -55,7 +55,7 @@ pub fn dual_quaternion_blend<'py>(
     weights: &Weights,
     pose_from_rest: Stack<'py, f64>,
     rest_bones: Option<Stack<'py, f64>>,
-    threads: usize,
+    #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (rest, matrices) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
     let (weights, bones) = (weights.to_core(py)?, rest_bones.as_ref().map(pose).transpose()?);

@@ -14,6 +14,7 @@ use crate::weights::Weights;
 pub struct Transfer {
     weights: Py<Weights>,
     matched: Py<PyArray1<bool>>,
+    confidence: Py<PyArray1<f32>>,
     distance: Py<PyArray1<f32>>,
     angle: Py<PyArray1<f32>>,
     raw_minimum: f64,
@@ -27,6 +28,7 @@ impl Transfer {
             report: report_dict(py, &transfer.report)?.unbind(),
             weights: Py::new(py, Weights::from_core(py, transfer.weights)?)?,
             matched: read_only(py, transfer.matched)?,
+            confidence: read_only(py, transfer.confidence)?,
             distance: read_only(py, transfer.distances)?,
             angle: read_only(py, transfer.angles)?,
         })
@@ -51,6 +53,7 @@ fn report_dict<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'p
         unmatched.append(entry)?;
     }
     dict.set_item("unmatched_islands", unmatched)?;
+    dict.set_item("rigid_islands", report.rigid_islands)?;
     dict.set_item("blocks", report.blocks)?;
     dict.set_item("factored_blocks", report.factored_blocks)?;
     dict.set_item("bones_used", report.bones_used)?;

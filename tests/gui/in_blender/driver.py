@@ -118,7 +118,7 @@ class Window:
             subprocess.run(["import", "-window", "root", str(SHARE / "out" / f"{name}.png")], check=True)
 
 
-def until(condition: Callable[[], object], seconds: float = 8.0) -> Steps:
+def until(condition: Callable[[], object], seconds: float = 20.0) -> Steps:
     for _ in range(int(seconds / 0.05)):
         if condition():
             return

@@ -78,6 +78,7 @@ def steps(window: Window) -> Steps:
         if number == 1:
             window.shoot("after_release")
 
+    before = positive()
     # One dab, pressed and released before Blender looks once.
     dabs()
     mouse.move((x + 20, y - 30))
@@ -85,18 +86,29 @@ def steps(window: Window) -> Steps:
     mouse.press()
     yield from release(mouse, 6)
 
-    # Blender's own undo takes back a step of the brush; the session's weights stand.
-    weights = dress.weights("Body")
+    # Blender's own undo and redo take the last stroke back and do it again.
+    weights = positive()
     with window.context():
         bpy.ops.ed.undo()
-    yield 0.5
-    assert dress.weights("Body") == weights and session().stroke_count == 6
+    mouse.move((x + 1, y))
+    yield from until(lambda: session().stroke_count == 5)
+    assert positive() == before
+    with window.context():
+        bpy.ops.ed.redo()
+    mouse.move((x, y))
+    yield from until(lambda: session().stroke_count == 6)
+    assert positive() == weights
 
     with window.context():
         bpy.ops.skinwright.end_sculpt_weights(keep=True)
     mouse.move((x, y))
     yield from until(lambda: session() is None)
-    assert dress.weights("Body") == weights
+    assert positive() == weights
+
+
+def positive() -> list[dict[str, float]]:
+    """What the vertices follow, without members of weight 0."""
+    return [{name: value for name, value in row.items() if value > 0} for row in dress.weights("Body")]
 
 
 start(steps)

@@ -102,15 +102,13 @@ def steps(window: Window) -> Steps:
 
     for expected in (once, begun):
         window.key("Z", ctrl=True)
-        yield 0.4
-        assert state() == expected, "undo within the session"
+        yield from until(lambda expected=expected: state() == expected)
     window.key("Z", ctrl=True)
     yield 0.4
     assert state() == begun and bpy.context.mode == "SCULPT", "undo went past the beginning of the session"
     for expected in (once, twice):
         window.key("Z", ctrl=True, shift=True)
-        yield 0.4
-        assert state() == expected, "redo within the session"
+        yield from until(lambda expected=expected: state() == expected)
     window.key("ESC")
     yield from until(nothing_is_left)
     yield 0.3
@@ -136,12 +134,10 @@ def steps(window: Window) -> Steps:
     assert kept[2] != bare[2]
     yield from window.screenshot("after_enter")
     window.key("Z", ctrl=True)
-    yield 1.0
-    assert state() == bare, "undo after the session"
+    yield from until(lambda: state() == bare and nothing_is_left())
     assert bpy.context.mode == "OBJECT", "undo after the session goes to another mode than it began in"
     window.key("Z", ctrl=True, shift=True)
-    yield 1.0
-    assert state() == kept, "redo after the session"
+    yield from until(lambda: state() == kept and nothing_is_left())
 
     # A new pose in the same session; what was sculpted before is remembered.
     yield from begin(window, desparsify=False)

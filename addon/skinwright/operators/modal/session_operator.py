@@ -5,6 +5,7 @@ from bpy.types import Context, Event, Operator
 
 from ...errors import Refused, internal
 from ...scene import changes
+from ...stored import keeping
 from . import brush_session, ending, held_input, keep_alive, status, timers
 from .brush_session import BrushSession, Message
 from .ending import Ending, remember
@@ -40,9 +41,11 @@ class SessionOperator(Operator):
     def _begun(self, context: Context) -> BrushSession | None:
         try:
             session = self.make(context)
+            keeping.keep_before([session.target()], session.label)
         except Refused as error:
             self._tell([Message("ERROR", str(error))])
             return None
+        keeping.keep_before([session.target()], session.label)
         # The way back from the session leads to the first of these steps, the second is where its strokes begin.
         bpy.ops.ed.undo_push(message=f"Before {session.label}")
         brush_session.current = session

@@ -7,7 +7,7 @@ something has changed while no other operator holds the input, and the session l
 from bpy.types import Context, Event, Object
 
 from ...errors import Refused
-from ...scene import modes
+from ...scene import changes, modes
 from ...sculpt import session as sculpt_session
 from ...sculpt.session import ADVICE, POOR, Outcome, SculptOptions, SculptSession
 from ..modal import undo
@@ -30,7 +30,7 @@ class SculptBrushes(BrushSession):
         super().__init__(obj)
         self.session = SculptSession(obj, options)
         self.news = "sculpt, and the weights follow"
-        self._was_changed = False
+        self._was_changed, self._checked = False, -1
         # Blender's undo step of each stroke, also of those taken back.
         self._stroke_at: list[int] = []
 
@@ -46,7 +46,10 @@ class SculptBrushes(BrushSession):
         return self.session.target()
 
     def problem(self, obj: Object) -> str:
-        """Other bones."""
+        """Other bones; looked at only when something has changed, as this is asked with every event."""
+        if self._checked == changes.version:
+            return ""
+        self._checked = changes.version
         return self.session.problem(obj)
 
     def changed_elsewhere(self, obj: Object) -> bool:

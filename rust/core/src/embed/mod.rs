@@ -1,7 +1,9 @@
 //! A skeleton into a mesh that has none.
 
+mod joints;
 mod medial;
 mod report;
+mod template;
 
 use glam::{DVec3, Vec3};
 
@@ -10,17 +12,21 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
 pub use report::Report;
+pub use template::{Donor, embed_from_character};
 
 /// How a skeleton is embedded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// From the shape of the mesh alone: any mesh, any armature, no other character needed.
     Medial,
+    /// From another character's mesh, weights and armature: the more alike the bodies, the better. See
+    /// [`embed_from_character`].
+    Template,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 1] = [Self::Medial];
+    pub const ALL: [Self; 2] = [Self::Medial, Self::Template];
 }
 
 /// The bones of a template at rest, up and front as in the mesh; place and size do not matter.
@@ -110,5 +116,8 @@ pub fn embed_skeleton(
     template.check()?;
     match method {
         Method::Medial => medial::embed(mesh, template, progress),
+        Method::Template => Err(Error::InvalidSkeleton {
+            reason: "method template needs mesh and weights of the character that the bones were made for".into(),
+        }),
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SymmetricMatrix};
 
 use super::constraint::Known;
-use super::rows::{KnownRows, Row};
+use super::rows::{GivenRows, KnownRows, Row};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -141,37 +141,94 @@ impl Block {
         {
             return Ok(BlockRows { columns, values: Values::Constant(*value) });
         }
-        let solution = self.factor.solve(&self.right_hand_sides(&fixed, &soft, &columns));
-        if solution.residual().is_nan() || solution.residual() > REFUSE_ABOVE {
-            return Err(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize });
-        }
+        let places = Places::of(&columns);
+        let own = |s: usize, row: &mut [f64]| places.add(row, &soft[s], self.soft[s].1);
+        let solution = self.checked(&self.right_hand_sides(&fixed, &places, own))?;
         Ok(BlockRows { columns, values: Values::Solved(solution) })
     }
 
-    /// `diag(b) W_0 - Q_UI W_I`, (unknowns, columns).
-    fn right_hand_sides(&self, fixed: &[Row], soft: &[Row], columns: &[u32]) -> RightHandSides {
-        let mut place = vec![0u32; columns.last().map_or(0, |&column| column as usize + 1)];
-        for (k, &column) in columns.iter().enumerate() {
-            place[column as usize] = k as u32;
+    /// Rows of the unknowns solved for twice: soft ones are pulled towards their rows first and towards the answer then, both
+    /// times with the rows of `added` on top.
+    ///
+    /// # Errors
+    /// Those of [`Block::solve`].
+    pub(super) fn solve_twice(&self, known: KnownRows<'_>, added: GivenRows<'_>) -> Result<BlockRows<'_>> {
+        let fixed: Vec<Row> = self.boundary.vertices.par_iter().map(|&i| known.row(i)).collect();
+        let with_added = |&(k, _): &(u32, f64)| {
+            let (i, mut added_row) = (self.unknowns[k as usize], Row::new());
+            added(i, &mut added_row);
+            (known.row(i), added_row)
+        };
+        let (soft, added): (Vec<Row>, Vec<Row>) = self.soft.par_iter().map(with_added).unzip();
+        let mut columns: Vec<u32> =
+            fixed.iter().chain(&soft).chain(&added).flatten().map(|&(column, _)| column).collect();
+        columns.par_sort_unstable();
+        columns.dedup();
+        let places = Places::of(&columns);
+        let own = |s: usize, row: &mut [f64]| {
+            places.add(row, &soft[s], self.soft[s].1);
+            places.add(row, &added[s], self.soft[s].1);
+        };
+        let first = self.checked(&self.right_hand_sides(&fixed, &places, own))?;
+        let again = |s: usize, row: &mut [f64]| {
+            let (k, confidence) = self.soft[s];
+            std::iter::zip(&mut *row, first.row(k as usize)).for_each(|(sum, value)| *sum += confidence * value);
+            places.add(row, &added[s], confidence);
+        };
+        let right_hand_sides = self.right_hand_sides(&fixed, &places, again);
+        drop(first);
+        Ok(BlockRows { values: Values::Solved(self.checked(&right_hand_sides)?), columns })
+    }
+
+    fn checked(&self, right_hand_sides: &RightHandSides) -> Result<Solution<'_>> {
+        let solution = self.factor.solve(right_hand_sides);
+        if solution.residual().is_nan() || solution.residual() > REFUSE_ABOVE {
+            return Err(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize });
         }
-        let mut soft_of = vec![u32::MAX; if soft.is_empty() { 0 } else { self.unknowns.len() }];
+        Ok(solution)
+    }
+
+    /// `diag(b) W_0 - Q_UI W_I`, (unknowns, columns); `add_soft` adds the first term for soft unknown s to a row.
+    fn right_hand_sides(
+        &self,
+        fixed: &[Row],
+        places: &Places,
+        add_soft: impl Fn(usize, &mut [f64]) + Sync,
+    ) -> RightHandSides {
+        let mut soft_of = vec![u32::MAX; if self.soft.is_empty() { 0 } else { self.unknowns.len() }];
         std::iter::zip(0.., &self.soft).for_each(|(s, &(k, _))| soft_of[k as usize] = s);
         let soft_of = |u: u32| soft_of.get(u as usize).copied().filter(|&s| s != u32::MAX);
         let entries = |u: u32| self.boundary.starts[u as usize]..self.boundary.starts[u as usize + 1];
         let in_band = |&u: &u32| !entries(u).is_empty() || soft_of(u).is_some();
         let band: Vec<u32> = (0..self.unknowns.len() as u32).filter(in_band).collect();
-        let mut values = vec![0.0; band.len() * columns.len()];
-        values.par_chunks_mut(columns.len().max(1)).zip(&band).with_min_len(256).for_each(|(row, &u)| {
-            let mut add = |known: &Row, factor: f64| {
-                known.iter().for_each(|&(column, value)| row[place[column as usize] as usize] += factor * value);
-            };
+        let mut values = vec![0.0; band.len() * places.count];
+        values.par_chunks_mut(places.count.max(1)).zip(&band).with_min_len(256).for_each(|(row, &u)| {
             for at in entries(u) {
-                add(&fixed[self.boundary.columns[at] as usize], -self.boundary.values[at]);
+                places.add(row, &fixed[self.boundary.columns[at] as usize], -self.boundary.values[at]);
             }
             if let Some(s) = soft_of(u) {
-                add(&soft[s as usize], self.soft[s as usize].1);
+                add_soft(s as usize, row);
             }
         });
-        RightHandSides::sparse(self.unknowns.len(), columns.len(), &band, values)
+        RightHandSides::sparse(self.unknowns.len(), places.count, &band, values)
+    }
+}
+
+/// Where each column of a block stands among its columns.
+struct Places {
+    of_column: Vec<u32>,
+    count: usize,
+}
+
+impl Places {
+    /// Of `columns`, ascending.
+    fn of(columns: &[u32]) -> Self {
+        let mut of_column = vec![0; columns.last().map_or(0, |&column| column as usize + 1)];
+        std::iter::zip(0.., columns).for_each(|(k, &column)| of_column[column as usize] = k);
+        Self { of_column, count: columns.len() }
+    }
+
+    fn add(&self, row: &mut [f64], known: &Row, factor: f64) {
+        known.iter().for_each(|&(column, value)| row[self.of_column[column as usize] as usize] += factor * value);
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::block::{Block, BlockRows, System};
 use super::constraint::Known;
-use super::rows::KnownRows;
+use super::rows::{GivenRows, KnownRows};
 use super::system::{independent_blocks, number_unknowns};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -73,5 +73,15 @@ impl Blocks {
     /// Solves all blocks.
     pub(super) fn solve(&self, known: KnownRows<'_>, progress: &Progress) -> Result<Vec<BlockRows<'_>>> {
         self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve(known))).collect()
+    }
+
+    /// Solves all blocks twice, see [`Block::solve_twice`].
+    pub(super) fn solve_twice(
+        &self,
+        known: KnownRows<'_>,
+        added: GivenRows<'_>,
+        progress: &Progress,
+    ) -> Result<Vec<BlockRows<'_>>> {
+        self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve_twice(known, added))).collect()
     }
 }

@@ -74,6 +74,9 @@ impl Assembled {
     }
 }
 
+/// Positions (V, 3), triangles (T, 3) and edges (E, 2) of a mesh.
+pub type Arrays<'a> = (&'a [[f32; 3]], &'a [[u32; 3]], &'a [[u32; 2]]);
+
 impl Fill {
     /// Prepares a mesh (V positions, T triangles). Vertices that `weld` declares to be one are one in the system: S and M
     /// are assembled on the welded triangles, without those that welding makes degenerate or equal, so that the answer is to
@@ -132,7 +135,7 @@ impl Fill {
     }
 
     /// The mesh that is solved on with all of its triangles and edges: positions, (T, 3), (E, 2).
-    pub fn arrays(&self) -> (&[[f32; 3]], &[[u32; 3]], &[[u32; 2]]) {
+    pub fn arrays(&self) -> Arrays<'_> {
         (&self.positions, self.all_triangles.as_ref().unwrap_or(&self.triangles), &self.edges)
     }
 
@@ -234,6 +237,23 @@ impl Fill {
     pub fn solve<'a>(&'a self, given: GivenRows<'a>, progress: &Progress) -> Result<Filled<'a>> {
         let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
         let rows = self.blocks.solve(known, progress)?;
+        Ok(Filled::new(known, self.blocks.as_slice(), rows))
+    }
+
+    /// Solves the problem posed last twice with one factor: soft rows are pulled towards the `given` ones first and towards
+    /// that answer then. With l = 0 this is as smooth as l > 0 makes it, at the price of a much smaller factor. Both times
+    /// the rows of `added`, by vertex of the mesh that is solved on, come on top of what soft rows are pulled to.
+    ///
+    /// # Errors
+    /// Those of [`Fill::solve`].
+    pub fn solve_twice<'a>(
+        &'a self,
+        given: GivenRows<'a>,
+        added: GivenRows<'_>,
+        progress: &Progress,
+    ) -> Result<Filled<'a>> {
+        let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
+        let rows = self.blocks.solve_twice(known, added, progress)?;
         Ok(Filled::new(known, self.blocks.as_slice(), rows))
     }
 }

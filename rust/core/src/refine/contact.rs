@@ -10,6 +10,8 @@ use super::surface::Surface;
 
 /// Rounds of pushing.
 const ROUNDS: usize = 40;
+/// Rounds without fewer pairs after which there is no hope.
+const STALLED: usize = 5;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
 const STEP: f32 = 0.15;
 /// How far a round moves them and the ring around towards the mean of their neighbours.
@@ -60,15 +62,16 @@ impl Contact {
             .filter(|&t| skin.triangles[t as usize].iter().any(|i| near.contains(i)))
             .collect();
         let mut now = places.clone();
-        let (mut fewest, mut moved) = (pairs.len(), Vec::new());
+        let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
         for _ in 0..ROUNDS {
             moved.extend(push(skin, &mut now, &pairs));
             pairs = self.pairs(skin, &now, Some(&among));
+            stalled += 1;
             if pairs.len() < fewest {
-                fewest = pairs.len();
+                (fewest, stalled) = (pairs.len(), 0);
                 places.clone_from(&now);
             }
-            if pairs.is_empty() {
+            if pairs.is_empty() || stalled == STALLED {
                 break;
             }
         }

@@ -14,6 +14,8 @@ use super::local::Local;
 const WIDTH: f32 = 0.4;
 /// How far a pass moves the membrane towards the mean of its neighbours.
 const SMOOTHING: f32 = 0.5;
+/// Edges up to this many radii are short.
+const FINE: f32 = 0.4;
 /// In contact is what has come this near to the plane, in radii: the lattice holds skin off the plane, and folds start
 /// before it is there.
 const TOUCH: f32 = 0.2;
@@ -58,6 +60,16 @@ impl Crease<'_> {
         self.members.iter().filter(touches).map(|member| member.particle).collect()
     }
 
+    /// 1 where edges are short beside the limb's radius; less where they are long, as each pass of smoothing then takes a
+    /// larger part of the limb away.
+    fn fineness(&self, local: &Local, rest: &[Vec3], vertices: &[u32]) -> f32 {
+        let place = |p: u32| rest[local.global[p as usize] as usize];
+        let lengths = vertices.iter().flat_map(|&p| local.ring(p).iter().map(move |&n| place(p).distance(place(n))));
+        let (sum, count) = lengths.fold((0.0, 0), |(sum, count), length| (sum + length, count + 1));
+        let edge = sum / count.max(1) as f32;
+        (FINE * self.radius / edge.max(1e-6)).powi(2).min(1.0)
+    }
+
     /// Passes of the membrane: towards the neighbours' mean, then back to the own side.
     pub(super) fn relax(&self, local: &mut Local, rest: &[Vec3], passes: usize) {
         for _ in 0..passes {
@@ -66,7 +78,7 @@ impl Crease<'_> {
                 return;
             }
             let near = within(local, rest, &contacts, WIDTH * self.radius);
-            smooth(local, &near, SMOOTHING);
+            smooth(local, &near, SMOOTHING * self.fineness(local, rest, &contacts));
             self.separate(local);
         }
     }

@@ -15,6 +15,9 @@ const REACH: f64 = 7.0;
 /// A bone shorter than this many radii has no direction of its own; the next one along the limb is taken with it.
 const SHORTEST: f64 = 1.5;
 
+/// A joint bent further than this at rest (radians), as a hip is, has a torso above it and not a limb.
+const MOST_BENT: f32 = 1.05;
+
 /// A particle of a joint, at rest.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Member {
@@ -150,5 +153,7 @@ fn is_limb(skeleton: &Skeleton, bone: usize, parent: usize, axis: &Axis, skin: &
     let mut distances: Vec<f32> = near.map(|p| axis.offset(p.as_vec3()).length()).collect();
     distances.sort_by(f32::total_cmp);
     let quantile = |q: f64| distances[((distances.len() - 1) as f64 * q) as usize];
-    length > 0.8 * radius && above > 0.3 * radius && quantile(0.9) < 4.0 * quantile(0.1)
+    let [up, down] = axis.directions;
+    let straight = (-up).angle_between(down) < MOST_BENT;
+    length > 0.8 * radius && above > 0.3 * radius && straight && quantile(0.9) < 4.0 * quantile(0.1)
 }

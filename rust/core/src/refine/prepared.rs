@@ -18,6 +18,8 @@ use crate::weights::Weights;
 
 /// Cells along the bounding box' diagonal by default: 1.5 % each.
 const CELLS_PER_DIAGONAL: f64 = 1.0 / 0.015;
+/// Enclosed volume, as a share of the cubed diagonal, below which a mesh is a sheet: on it winding numbers mean nothing.
+const LEAST_VOLUME: f64 = 1e-8;
 /// Vertices that a mesh may have: more would take minutes to prepare and gigabytes to keep.
 const MOST_VERTICES: usize = 2_000_000;
 
@@ -63,7 +65,7 @@ impl Prepared {
         let skeleton = Skeleton::new(parents, segments, weights.n_bones() as usize)?;
         let surface = Surface::new(mesh);
         let cell = settings.cell.unwrap_or(mesh.diagonal() / CELLS_PER_DIAGONAL);
-        if cell.is_nan() || cell <= 0.0 || surface.triangles.is_empty() {
+        if cell.is_nan() || cell <= 0.0 || enclosed(&surface) <= LEAST_VOLUME * mesh.diagonal().powi(3) {
             return Err(Error::NothingInside);
         }
         let winding = Winding::new(mesh);
@@ -131,6 +133,14 @@ impl Prepared {
     pub(super) fn in_mesh(&self, place: Vec3) -> Vec3 {
         (place.as_dvec3() * self.cell + self.middle).as_vec3()
     }
+}
+
+/// The volume between the surface and the middle of its vertices, regardless of sign.
+fn enclosed(surface: &Surface) -> f64 {
+    let middle = surface.rest.iter().sum::<DVec3>() / surface.len().max(1) as f64;
+    let corner = |i: u32| surface.rest[i as usize] - middle;
+    let parts = surface.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))));
+    parts.sum::<f64>().abs() / 6.0
 }
 
 fn check(mesh: &TriMesh<'_>, weights: &Weights) -> Result<()> {

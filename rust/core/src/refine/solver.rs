@@ -32,6 +32,8 @@ const IN_CONTACT: f32 = 0.04;
 const PASSES: usize = 2;
 /// Times that tetrahedra turned inside out are looked for at the end.
 const UNTANGLING: usize = 12;
+/// Loss of a joint's volume from which it is asked whether skinning did better.
+const HARM: f64 = 0.1;
 /// Times that the volume is restored and the folds that this makes are taken out.
 const BALLOONS: usize = 2;
 
@@ -257,7 +259,28 @@ impl Frame<'_> {
             }
             parted.extend(more);
         }
+        clock.time("balloon", || self.undo_harm(pose, &axes));
         self.clock = clock;
+    }
+
+    /// Gives a joint back to skinning where solving has cost it far more volume than skinning does: on very coarse skin
+    /// nothing is left of the inner side once it is pressed into the plane.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis]) {
+        for k in 0..self.active.len() {
+            let (after, _) = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize]));
+            if after.abs() < HARM {
+                continue;
+            }
+            let skin = skinned(self.prepared, &self.local, pose);
+            let (before, _) = self.measure(k, pose, &axes[k], &|p| skin[p as usize]);
+            if after.abs() < before.abs() + HARM / 2.0 {
+                continue;
+            }
+            for member in &self.local.free[k] {
+                let particle = &mut self.local.particles[member.particle as usize];
+                [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
+            }
+        }
     }
 
     /// Takes out what folds are left in the region's skin; returns the particles that moved.

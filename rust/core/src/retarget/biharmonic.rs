@@ -11,9 +11,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::matching::Match;
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
+use crate::registration::Match;
 
 /// Source vertices that are blended.
 pub const BEST: usize = 4;

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::Settings;
 use super::rows::{Row, normalise};
-use super::welded::Welded;
 use crate::error::Result;
 use crate::fill::{Constraint, Fill};
 use crate::progress::Progress;
+use crate::registration::Welded;
 use crate::weights::Weights;
 
 /// Smoothness length of the filling, as a share of the target's diagonal.

@@ -9,21 +9,17 @@ mod alignment;
 mod biharmonic;
 mod confidence;
 mod finish;
-mod matching;
 mod prepared;
-mod registration;
 mod rows;
 mod settings;
 mod shares;
 mod skeleton;
-mod smooth;
 mod warp;
-mod welded;
 
 use std::time::Instant;
 
+pub use crate::registration::MatchPoints;
 pub use biharmonic::Landmark;
-pub use matching::{Match, MatchPoints};
 pub use settings::{Method, Settings};
 pub use skeleton::{BonePair, RestBone, Skeleton};
 
@@ -32,9 +28,6 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
 use prepared::Prepared;
-
-/// Vertices of one mesh that are closer than this share of its diagonal are one.
-const MERGE_DISTANCE: f64 = 1e-6;
 
 /// A character at rest: mesh and skeleton in one space.
 #[derive(Debug, Clone, Copy)]
@@ -49,9 +42,9 @@ pub struct Character<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Correspondence<'a> {
     /// The source's bone for each of the target's, negative for none.
-    pub bone_map: &'a [i64],
+    pub bone_map: &'a [i32],
     /// Parents of the source's bones, negative for a root; say who inherits from a bone without a partner.
-    pub source_parents: Option<&'a [i64]>,
+    pub source_parents: Option<&'a [i32]>,
     /// Pairs of vertices for the Biharmonic method, beside those that the bones give.
     pub landmarks: &'a [Landmark],
 }

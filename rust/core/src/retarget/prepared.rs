@@ -3,24 +3,26 @@
 use glam::{DVec3, Vec3};
 
 use super::biharmonic::{Described, blends, check_landmarks, landmarks_of_matches};
-use super::matching::{Lengths, Match, Matching};
-use super::registration::register;
 use super::rows::{Row, blended};
 use super::shares::Shares;
-use super::skeleton::{BonePair, RestBone, pairs};
+use super::skeleton::{Guide, RestBone, guides, pairs};
 use super::warp::Warp;
-use super::welded::Welded;
 use super::{Character, Correspondence, Landmark, Report, Settings};
 use crate::adjacency::Islands;
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
+use crate::registration::Welded;
+use crate::registration::{Lengths, Match, Matching};
+use crate::registration::{Schedule, register};
 use crate::weights::Weights;
 
 /// Length over which normals are smoothed, as a share of the source's diagonal.
 const NORMAL_SMOOTHING: f64 = 0.02;
+/// The rounds of the optional registration.
+const ROUNDS: Schedule<'static> = Schedule { lengths: &[0.15, 0.1, 0.075, 0.05, 0.035, 0.025, 0.015], trusted: 0.04 };
 /// How far vertices follow the weights of their first match.
-const FOLLOW: f64 = 0.5;
+const FOLLOW: f64 = 0.4;
 
 /// Everything that is known before the first vertex is matched.
 #[derive(Debug)]
@@ -30,7 +32,7 @@ pub(super) struct Prepared<'a> {
     correspondence: Correspondence<'a>,
     settings: &'a Settings,
     /// Pairs whose source bone holds weight: they guide the warp.
-    guides: Vec<BonePair>,
+    guides: Vec<Guide>,
     shares: Shares<'a>,
     warp: Warp,
     source: Welded,
@@ -63,18 +65,18 @@ impl<'a> Prepared<'a> {
         check_landmarks(correspondence.landmarks, source.mesh.vertex_count(), target.mesh.vertex_count())?;
         let pairs = pairs(correspondence.bone_map, source.skeleton, target.skeleton)?;
         let parents = correspondence.source_parents;
-        if let Some(found) = parents.map(<[i64]>::len).filter(|&found| found != source.skeleton.bones().len()) {
+        if let Some(found) = parents.map(<[i32]>::len).filter(|&found| found != source.skeleton.bones().len()) {
             let expected = source.skeleton.bones().len();
             return Err(Error::LengthMismatch { what: "source_parents", found, expected });
         }
         let weighted = weighted_bones(weights);
-        let guides: Vec<BonePair> = pairs.iter().filter(|pair| weighted[pair.source as usize]).copied().collect();
+        let guides = guides(&pairs, source.skeleton, target.skeleton, &weighted);
         if guides.is_empty() {
             return Err(Error::NoCommonBones);
         }
         Ok(Self {
             shares: Shares::new(&pairs, source.skeleton, target.skeleton, parents, &weighted),
-            warp: Warp::new(&guides, source.skeleton, target.skeleton),
+            warp: Warp::new(&guides),
             size: source.mesh.diagonal(),
             source: Welded::new(&source.mesh),
             target: Welded::new(&target.mesh),
@@ -88,7 +90,7 @@ impl<'a> Prepared<'a> {
 
     /// What is known before the work starts.
     pub fn report(&self) -> Report {
-        let without = |(target, source): (u32, &i64)| (*source < 0).then_some(target);
+        let without = |(target, source): (u32, &i32)| (*source < 0).then_some(target);
         Report {
             vertices: self.target.of_vertex.len(),
             bones: self.guides.len(),
@@ -113,7 +115,8 @@ impl<'a> Prepared<'a> {
         progress.report(0.1);
         progress.check()?;
         if self.settings.registration {
-            positions = register(&matching, &self.target.triangles, positions, self.size, progress)?;
+            let (triangles, watch) = (&self.target.triangles, (progress, (0.1, 0.7)));
+            positions = register(&matching, triangles, positions, self.size, ROUNDS, watch)?;
         }
         let (matches, normals) = matching.closest(&positions)?;
         progress.report(0.7);
@@ -122,12 +125,14 @@ impl<'a> Prepared<'a> {
         Ok(Placed { positions, normals, source_normals, matches })
     }
 
-    /// Moves each vertex halfway to where the weights of its match would carry it: the nearest bones change abruptly between
+    /// Moves each vertex part of the way to where the weights of its match would carry it: the nearest bones change abruptly between
     /// limbs, painted weights do not.
     fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
         let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);
         let mut guide_of = vec![None; self.characters[1].skeleton.bones().len()];
-        (0..).zip(&self.guides).for_each(|(k, guide)| guide_of[guide.target as usize] = Some(k));
+        for (k, guide) in self.guides.iter().enumerate() {
+            guide.targets.iter().for_each(|&t| guide_of[t as usize] = Some(k));
+        }
         let carried = self.warp.apply_weighted(&self.target.positions, &rows, &guide_of);
         positions.iter_mut().zip(carried).for_each(|(position, carried)| *position = position.lerp(carried, FOLLOW));
         Ok(())
@@ -186,12 +191,11 @@ impl<'a> Prepared<'a> {
 
     /// Those of the artist, and one beside the head of each bone that guides.
     fn landmarks(&self, placed: &Placed) -> Vec<Landmark> {
-        let head = |pair: &BonePair| self.characters[1].skeleton.bones()[pair.target as usize].head;
         let squared = |u: &usize, head: DVec3| self.target.positions[*u].distance_squared(head);
         let nearest = |head: DVec3| {
             (0..self.target.positions.len()).min_by(|a, b| squared(a, head).total_cmp(&squared(b, head))).unwrap_or(0)
         };
-        let beside: Vec<usize> = self.guides.iter().map(|pair| nearest(head(pair))).collect();
+        let beside: Vec<usize> = self.guides.iter().map(|guide| nearest(guide.target.head)).collect();
         let vertices: Vec<u32> = beside.iter().map(|&u| self.target.first[u]).collect();
         let matches: Vec<Match> = beside.iter().map(|&u| placed.matches[u]).collect();
         let mut landmarks = self.correspondence.landmarks.to_vec();
@@ -201,9 +205,8 @@ impl<'a> Prepared<'a> {
 
     /// The nearest two guides of each vertex; `side` 0 is the source, 1 the target.
     fn regions(&self, welded: &Welded, side: usize) -> Vec<[u32; 2]> {
-        let bones = self.characters[side].skeleton.bones();
-        let bone = |pair: &BonePair| bones[[pair.source, pair.target][side] as usize];
-        let guides: Vec<RestBone> = self.guides.iter().map(bone).collect();
+        let of_side = |guide: &Guide| [guide.source, guide.target][side];
+        let guides: Vec<RestBone> = self.guides.iter().map(of_side).collect();
         let nearest = |&p: &DVec3| {
             let mut best = [(f64::INFINITY, 0); 2];
             for (k, bone) in (0..).zip(&guides) {

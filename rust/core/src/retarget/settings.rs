@@ -1,7 +1,7 @@
 //! What an artist can choose.
 
-use super::matching::MatchPoints;
 use crate::error::{Error, Result};
+use crate::registration::MatchPoints;
 
 /// How vertices of the target find their place on the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -75,7 +75,13 @@ impl Settings {
             ("max_distance", self.max_distance, self.max_distance >= 0.0, at_least_0),
             ("max_normal_angle", self.max_normal_angle, self.max_normal_angle >= 0.0, at_least_0),
             ("max_stretch", self.max_stretch, self.max_stretch >= 1.0, "it must be at least 1 and finite"),
-            ("n_pairs", self.n_pairs as f64, self.n_pairs > 0, "it must be at least 1"),
+            ("n_pairs", self.n_pairs as f64, (1..=2000).contains(&self.n_pairs), "it must lie between 1 and 2000"),
+            (
+                "smoothing_iterations",
+                f64::from(self.smoothing_iterations),
+                self.smoothing_iterations <= 1000,
+                "it must be at most 1000",
+            ),
             (
                 "smoothing_factor",
                 self.smoothing_factor,

@@ -23,7 +23,7 @@ impl<'a> Shares<'a> {
         pairs: &[BonePair],
         source: &Skeleton,
         target: &'a Skeleton,
-        parents: Option<&[i64]>,
+        parents: Option<&[i32]>,
         weighted: &[bool],
     ) -> Self {
         let mut partners = vec![Vec::new(); source.bones().len()];
@@ -58,7 +58,7 @@ impl<'a> Shares<'a> {
     }
 }
 
-fn mapped_ancestor(bone: usize, parents: &[i64], partners: &[Vec<u32>]) -> Option<usize> {
+fn mapped_ancestor(bone: usize, parents: &[i32], partners: &[Vec<u32>]) -> Option<usize> {
     let mut at = bone;
     // A cycle among the parents ends the walk.
     for _ in 0..parents.len() {

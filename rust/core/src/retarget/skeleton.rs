@@ -97,16 +97,16 @@ pub struct BonePair {
 ///
 /// # Errors
 /// [`Error::LengthMismatch`], [`Error::InvalidParameter`], [`Error::NoCommonBones`], [`Error::UnusableBone`].
-pub fn pairs(bone_map: &[i64], source: &Skeleton, target: &Skeleton) -> Result<Vec<BonePair>> {
+pub fn pairs(bone_map: &[i32], source: &Skeleton, target: &Skeleton) -> Result<Vec<BonePair>> {
     let (found, expected) = (bone_map.len(), target.bones.len());
     if found != expected {
         return Err(Error::LengthMismatch { what: "bone_map", found, expected });
     }
-    if let Some(&value) = bone_map.iter().find(|&&s| s >= source.bones.len() as i64) {
+    if let Some(&value) = bone_map.iter().find(|&&s| s >= source.bones.len() as i32) {
         let must = "it must name a bone of the source, or be negative for none";
-        return Err(Error::InvalidParameter { name: "bone_map", value: value as f64, must });
+        return Err(Error::InvalidParameter { name: "bone_map", value: f64::from(value), must });
     }
-    let pair = |(target, &source): (usize, &i64)| {
+    let pair = |(target, &source): (usize, &i32)| {
         (source >= 0).then_some(BonePair { source: source as u32, target: target as u32 })
     };
     let pairs: Vec<BonePair> = bone_map.iter().enumerate().filter_map(pair).collect();
@@ -118,4 +118,46 @@ pub fn pairs(bone_map: &[i64], source: &Skeleton, target: &Skeleton) -> Result<V
         target.check_has_size(pair.target as usize, "target")?;
     }
     Ok(pairs)
+}
+
+/// A bone of the source and what stands for it on the target: a bone, or a chain of them taken as one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guide {
+    /// The source's bone.
+    pub source: RestBone,
+    /// From the head of the first to the tail of the last of `targets`.
+    pub target: RestBone,
+    /// Indices among the target's bones.
+    pub targets: Vec<u32>,
+}
+
+/// The guides of `pairs` whose source bone is `weighted` (the source's bones), in the order of first appearance.
+pub fn guides(pairs: &[BonePair], source: &Skeleton, target: &Skeleton, weighted: &[bool]) -> Vec<Guide> {
+    let mut groups: Vec<(u32, Vec<u32>)> = Vec::new();
+    for pair in pairs.iter().filter(|pair| weighted[pair.source as usize]) {
+        match groups.iter_mut().find(|group| group.0 == pair.source) {
+            Some(group) => group.1.push(pair.target),
+            None => groups.push((pair.source, vec![pair.target])),
+        }
+    }
+    let guide = |(bone, targets): (u32, Vec<u32>)| Guide {
+        source: source.bones[bone as usize],
+        target: united(&targets.iter().map(|&t| target.bones[t as usize]).collect::<Vec<_>>()),
+        targets,
+    };
+    groups.into_iter().map(guide).collect()
+}
+
+/// The longest way from a head to a tail along the bones' common direction; one bone is itself.
+fn united(bones: &[RestBone]) -> RestBone {
+    let common: DVec3 = bones.iter().map(|bone| bone.length * bone.direction()).sum();
+    let ways = bones.iter().flat_map(|from| bones.iter().map(move |to| (from, to.tail() - from.head)));
+    let (first, way) = ways.max_by(|a, b| a.1.dot(common).total_cmp(&b.1.dot(common))).expect("there is a bone");
+    let direction = way.normalize_or_zero();
+    if bones.len() == 1 || direction == DVec3::ZERO {
+        return bones[0];
+    }
+    let x = first.axes.x_axis.reject_from(direction).normalize_or_zero();
+    let x = if x == DVec3::ZERO { direction.any_orthonormal_vector() } else { x };
+    RestBone { head: first.head, axes: DMat3::from_cols(x, direction, x.cross(direction)), length: way.length() }
 }

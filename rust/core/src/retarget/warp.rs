@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::alignment::{best_rotation, swing};
 use super::rows::Row;
-use super::skeleton::{BonePair, RestBone, Skeleton};
+use super::skeleton::{Guide, RestBone};
 
 /// Bones that share in one vertex.
 const NEAREST: usize = 3;
@@ -36,10 +36,9 @@ struct BoneWarp {
 }
 
 impl Warp {
-    /// Prepares the warp by `pairs` of bones (at least one).
-    pub fn new(pairs: &[BonePair], source: &Skeleton, target: &Skeleton) -> Self {
-        let bones: Vec<(RestBone, RestBone)> =
-            pairs.iter().map(|p| (source.bones()[p.source as usize], target.bones()[p.target as usize])).collect();
+    /// Prepares the warp by `guides` (at least one).
+    pub fn new(guides: &[Guide]) -> Self {
+        let bones: Vec<(RestBone, RestBone)> = guides.iter().map(|guide| (guide.source, guide.target)).collect();
         let facing = facing(&bones);
         let across = size_ratio(&bones);
         let bone = |&(source, target): &(RestBone, RestBone)| BoneWarp {

@@ -6,6 +6,7 @@
 //! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used
 //! again.
 
+mod detail;
 mod islands;
 pub mod limit;
 pub mod matching;
@@ -14,6 +15,7 @@ mod pipeline;
 mod prepared;
 mod report;
 mod settings;
+mod small_islands;
 pub mod smooth;
 mod source;
 mod target;
@@ -23,6 +25,7 @@ pub use matching::{Criteria, MaskValue, MatchMethod};
 pub use prepared::{Inpainting, RawWeights};
 pub use report::Report;
 pub use settings::{Length, Settings};
+pub use small_islands::SmallIslands;
 pub use source::Source;
 pub use target::TargetMesh;
 
@@ -35,8 +38,10 @@ use crate::weights::Weights;
 pub struct Transfer {
     /// The new weights: rows sum to 1, bones ascending. Rows of skipped islands are empty.
     pub weights: Weights,
-    /// Which vertices took their weights from the source.
+    /// Which vertices took their weights from the source: those that trust its row by a half or more.
     pub matched: Vec<bool>,
+    /// How far the row from the source was trusted, 0 to 1.
+    pub confidence: Vec<f32>,
     /// Distance of each vertex to its point on the source, world units.
     pub distances: Vec<f32>,
     /// Angle between the normals there, radians, NaN where one is missing.

@@ -1,10 +1,13 @@
 //! The steps of a transfer: constraints -> fill -> smooth -> islands -> limit.
 
+use super::detail::Detail;
 use super::islands::Scene;
-use super::matching::DISTANCE_REFERENCE;
+use super::matching::{DISTANCE_REFERENCE, Terms};
 use super::report::{Report, Stages};
 use super::smooth::{push_normalised, region, smooth};
-use super::{Criteria, Inpainting, IslandPolicy, Length, MaskValue, Settings, Transfer, limit};
+use super::{
+    Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, limit, small_islands,
+};
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
 use crate::fill::{Constraint, Filled, Row};
@@ -28,8 +31,8 @@ pub(super) struct Problem {
 impl Problem {
     /// Decides what is known, and which islands hang on nothing.
     pub fn new(prepared: &Inpainting, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Self> {
-        let criteria = Criteria::new(settings, &prepared.source, &prepared.target);
-        let constraints = prepared.matches.constraints(&criteria, mask);
+        let terms = terms(prepared, settings);
+        let (criteria, constraints) = (terms.criteria, prepared.matches.constraints(&terms, mask));
         let islands = prepared.target.fill.islands();
         let mut has_match = vec![false; islands.count()];
         let known = std::iter::zip(islands.of_vertex(), &constraints);
@@ -39,9 +42,19 @@ impl Problem {
         if !has_match.contains(&true) && !can_do_without_match(prepared, mask, settings) {
             return Err(nothing_matched(prepared, &criteria, mask, settings));
         }
-        let smoothness_length = settings.smoothness_length.of(prepared.source.diagonal());
+        let smoothness_length = match settings.method {
+            MatchMethod::ClosestPoint => settings.smoothness_length.of(prepared.source.diagonal()),
+            // Solving twice is what makes it smooth.
+            MatchMethod::Confidence => 0.0,
+        };
         Ok(Self { criteria, smoothness_length, constraints, has_match })
     }
+}
+
+/// What makes constraints of the points that were found.
+pub(super) fn terms<'a>(prepared: &'a Inpainting, settings: &Settings) -> Terms<'a> {
+    let criteria = Criteria::new(settings, &prepared.source, &prepared.target);
+    Terms { criteria, softness: settings.softness, fill: &prepared.target.fill }
 }
 
 /// Whether the policy for islands has an answer where nothing matches: it has one near the body, unless the mask forbids
@@ -89,31 +102,87 @@ pub(super) fn solve(
     progress.report(0.7);
     progress.check()?;
     stages.end("factor");
-    let prepared = &*prepared;
-    let given = |i: u32, row: &mut Row| prepared.matches.append_row(&prepared.source, i, row);
-    let filled = prepared.target.fill.solve(&given, progress)?;
+    let (weights, report) = filled(prepared, &problem, mask, progress, |filled| {
+        let (raw_minimum, largest_residual) = (filled.minimum(), filled.largest_residual());
+        (gather(prepared, filled), Report { raw_minimum, largest_residual, ..Report::default() })
+    })?;
+    let confidence = prepared.matches.confidence(&problem.constraints, settings.softness, mask);
+    let matched = trusted(&confidence);
+    let report = report.of_problem(prepared, &problem, &matched);
     stages.end("solve");
-    let weights = gather(prepared, &filled);
-    stages.end("gather");
+    let weights = inpaint_masked(prepared, weights, &problem, mask, settings, progress)?;
+    let prepared = &*prepared;
+    stages.end("inpaint");
     let weights = smoothed(prepared, weights, &problem, settings, progress)?;
     stages.end("smooth");
     progress.check()?;
+    let (weights, rigid_islands) = stiffened(prepared, weights, settings);
     let surface = prepared.target.fill.triangles_and_wires();
     let (weights, unmatched_islands) =
         scene(prepared, &problem, &surface).fill(weights, settings.island_policy, progress)?;
     let weights = if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
     stages.end("islands and limit");
-    let matched = matched(&problem.constraints);
-    let report = Report {
-        unmatched_islands,
-        factored_blocks,
-        raw_minimum: filled.minimum(),
-        largest_residual: filled.largest_residual(),
-        seconds: prepared.preparation.iter().copied().chain(stages.into_seconds()).collect(),
-        ..Report::of_problem(prepared, &problem, &matched)
-    };
+    let seconds = prepared.preparation.iter().copied().chain(stages.into_seconds()).collect();
+    let report = Report { unmatched_islands, rigid_islands, factored_blocks, seconds, ..report };
     let (distances, angles) = (prepared.matches.distances(), prepared.matches.angles().to_vec());
-    Ok(Transfer { report: report.counting(&weights), weights, matched, distances, angles })
+    Ok(Transfer { report: report.counting(&weights), weights, matched, confidence, distances, angles })
+}
+
+/// Solves the problem that is factored and hands all rows to `take`.
+pub(super) fn filled<T>(
+    prepared: &Inpainting,
+    problem: &Problem,
+    mask: Option<&[MaskValue]>,
+    progress: &Progress,
+    take: impl FnOnce(&Filled<'_>) -> T,
+) -> Result<T> {
+    let Inpainting { source, matches, target, .. } = prepared;
+    let own = |i: u32, row: &mut Row| matches.append_row(source, mask, i, row);
+    if matches.method() == MatchMethod::ClosestPoint {
+        return Ok(take(&target.fill.solve(&own, progress)?));
+    }
+    let detail = Detail::new(source, matches, &target.fill, &problem.constraints, own);
+    let own = |i: u32, row: &mut Row| row.extend(detail.own(i));
+    let added = |i: u32, row: &mut Row| row.extend(detail.added(i));
+    Ok(take(&target.fill.solve_twice(&own, &added, progress)?))
+}
+
+/// With [`MatchMethod::Confidence`], vertices that the mask says to inpaint are filled in last, by the paper's energy between
+/// the rows of all others.
+fn inpaint_masked(
+    prepared: &mut Inpainting,
+    weights: Weights,
+    problem: &Problem,
+    mask: Option<&[MaskValue]>,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Weights> {
+    let Some(mask) = mask.filter(|mask| mask.contains(&MaskValue::Inpaint)) else { return Ok(weights) };
+    if settings.method == MatchMethod::ClosestPoint {
+        return Ok(weights);
+    }
+    let constraint = |(&known, &mask): (&Constraint, &MaskValue)| match mask {
+        MaskValue::Automatic | MaskValue::ForceMatch if known.is_known() => Constraint::Fixed,
+        _ => Constraint::Free,
+    };
+    let constraints = std::iter::zip(&problem.constraints, mask).map(constraint).collect();
+    let length = settings.smoothness_length.of(prepared.source.diagonal());
+    let fill = &mut prepared.target.fill;
+    let assembled = fill.assemble(constraints, length, progress)?;
+    fill.factor(assembled, progress)?;
+    let given = |i: u32, row: &mut Row| {
+        let (bones, values) = weights.row(i as usize);
+        row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value))));
+    };
+    Ok(gather(prepared, &prepared.target.fill.solve(&given, progress)?))
+}
+
+fn stiffened(prepared: &Inpainting, weights: Weights, settings: &Settings) -> (Weights, usize) {
+    if !settings.stiffens() {
+        return (weights, 0);
+    }
+    let gaps: Vec<f64> = prepared.matches.points().iter().map(|point| point.distance).collect();
+    small_islands::stiffen(weights, &prepared.target.fill, &gaps, prepared.source.size())
 }
 
 /// Clamps and normalises the rows; those of islands without a match stay empty.
@@ -152,7 +221,7 @@ fn scene<'a>(prepared: &'a Inpainting, problem: &'a Problem, surface: &'a [[u32;
     }
 }
 
-/// Which vertices are held at the source's weights.
-pub(super) fn matched(constraints: &[Constraint]) -> Vec<bool> {
-    constraints.iter().map(|&known| known == Constraint::Fixed).collect()
+/// Which vertices trust the source's row by a half or more.
+pub(super) fn trusted(confidence: &[f32]) -> Vec<bool> {
+    confidence.iter().map(|&confidence| confidence >= 0.5).collect()
 }

@@ -77,14 +77,23 @@ impl Inpainting {
         Ok(())
     }
 
-    /// Which vertices match (V), given a `mask` (V) and the thresholds of `settings`.
+    /// Which vertices match (V), given a `mask` (V) and `settings`: those whose confidence is at least a half.
     ///
     /// # Errors
     /// [`Error::InvalidParameter`](crate::Error::InvalidParameter), [`Error::LengthMismatch`](crate::Error::LengthMismatch).
     pub fn matched(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<bool>> {
+        Ok(pipeline::trusted(&self.confidence(mask, settings)?))
+    }
+
+    /// How far the row that each vertex takes from the source is trusted, 0 to 1 (V): all or nothing with
+    /// [`MatchMethod::ClosestPoint`](super::MatchMethod::ClosestPoint), and where the mask decides.
+    ///
+    /// # Errors
+    /// Those of [`Inpainting::matched`].
+    pub fn confidence(&mut self, mask: Option<&[MaskValue]>, settings: &Settings) -> Result<Vec<f32>> {
         let mask = self.prepare_for(mask, settings)?;
-        let criteria = Criteria::new(settings, &self.source, &self.target);
-        Ok(self.target.expand(pipeline::matched(&self.matches.constraints(&criteria, mask.as_deref()))))
+        let constraints = self.matches.constraints(&pipeline::terms(self, settings), mask.as_deref());
+        Ok(self.target.expand(self.matches.confidence(&constraints, settings.softness, mask.as_deref())))
     }
 
     /// Transfers the source's weights, given a `mask` (V). Vertices that are one get the same bits.
@@ -110,21 +119,21 @@ impl Inpainting {
         let progress = Progress::default();
         let problem = Problem::new(self, mask.as_deref(), settings)?;
         let fill = &mut self.target.fill;
-        let assembled = fill.assemble(problem.constraints, problem.smoothness_length, &progress)?;
+        let assembled = fill.assemble(problem.constraints.clone(), problem.smoothness_length, &progress)?;
         fill.factor(assembled, &progress)?;
-        let given = |i: u32, row: &mut Row| self.matches.append_row(&self.source, i, row);
-        let filled = self.target.fill.solve(&given, &progress)?;
         let class_of = self.target.expand((0..self.target.fill.unknown().len() as u32).collect());
         let is_unknown = |&i: &u32| self.target.fill.unknown()[class_of[i as usize] as usize];
         let vertices: Vec<u32> = (0..class_of.len() as u32).filter(is_unknown).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
-        let mut row = Row::new();
-        for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
-            row.clear();
-            filled.append_row(class_of[i as usize] as usize, &mut row);
-            row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
-        }
+        pipeline::filled(self, &problem, mask.as_deref(), &progress, |filled| {
+            let mut row = Row::new();
+            for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
+                row.clear();
+                filled.append_row(class_of[i as usize] as usize, &mut row);
+                row.iter().for_each(|&(bone, value)| values[bone as usize] = value);
+            }
+        })?;
         Ok(RawWeights { vertices, values })
     }
 

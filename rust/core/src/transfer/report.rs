@@ -25,6 +25,8 @@ pub struct Report {
     pub islands: usize,
     /// Islands without a match and what became of them.
     pub unmatched_islands: Vec<UnmatchedIsland>,
+    /// Small loose islands that were made rigid.
+    pub rigid_islands: usize,
     /// Independent blocks of the system, and how many of them had to be factored.
     pub blocks: usize,
     /// See `blocks`.
@@ -50,8 +52,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// What is settled before anything is solved.
-    pub(super) fn of_problem(prepared: &Inpainting, problem: &Problem, matched: &[bool]) -> Self {
+    /// With what the problem and its blocks tell.
+    pub(super) fn of_problem(self, prepared: &Inpainting, problem: &Problem, matched: &[bool]) -> Self {
         let fill = &prepared.target.fill;
         let (source_unweighted, source_unnormalised) = prepared.source.unweighted_and_unnormalised();
         Self {
@@ -64,7 +66,7 @@ impl Report {
             blocks: fill.block_count(),
             max_distance: problem.criteria.max_distance,
             smoothness_length: problem.smoothness_length,
-            ..Self::default()
+            ..self
         }
     }
 

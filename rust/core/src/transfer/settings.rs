@@ -1,6 +1,6 @@
 //! What the artist can set.
 
-use super::{IslandPolicy, MatchMethod};
+use super::{IslandPolicy, MatchMethod, SmallIslands};
 use crate::error::{Error, Result};
 
 /// A length, in world units or as a share of a bounding-box diagonal.
@@ -31,6 +31,9 @@ impl Length {
 pub struct Settings {
     /// How matching points are found. Default [`MatchMethod::ClosestPoint`].
     pub method: MatchMethod,
+    /// How soft [`MatchMethod::Confidence`] is: the length over which a row is trusted, as a multiple of the gap to the source.
+    /// Default 0.7; 0.35 to 1.4 are useful.
+    pub softness: f64,
     /// Largest distance of a match; relative to the target's diagonal, or to 30 % of the source's if that is larger. Default
     /// 0.05 relative.
     pub max_distance: Length,
@@ -51,12 +54,15 @@ pub struct Settings {
     pub max_influences: usize,
     /// What islands without a match get. Default [`IslandPolicy::Bridge`].
     pub island_policy: IslandPolicy,
+    /// What small loose parts become. Default [`SmallIslands::Auto`].
+    pub small_islands: SmallIslands,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         Self {
             method: MatchMethod::ClosestPoint,
+            softness: 0.7,
             max_distance: Length::Relative(0.05),
             weld_tolerance: Length::Relative(1e-6),
             max_normal_angle: 35f64.to_radians(),
@@ -66,17 +72,29 @@ impl Default for Settings {
             smoothing_factor: 0.2,
             max_influences: 0,
             island_policy: IslandPolicy::Bridge,
+            small_islands: SmallIslands::Auto,
         }
     }
 }
 
 impl Settings {
+    /// Whether small, loose, nearly rigid islands become rigid.
+    pub(super) fn stiffens(&self) -> bool {
+        match self.small_islands {
+            SmallIslands::Auto => self.method == MatchMethod::Confidence,
+            SmallIslands::Rigid => true,
+            SmallIslands::Solved => false,
+        }
+    }
+
     /// # Errors
     /// [`Error::InvalidParameter`] for the first value out of range.
     pub fn check(&self) -> Result<()> {
         self.max_distance.check("max_distance")?;
         self.weld_tolerance.check("weld_tolerance")?;
         self.smoothness_length.check("smoothness_length")?;
+        let softness = self.softness;
+        check_range("softness", softness, softness > 0.0, "must be a number above 0")?;
         let (angle, factor) = (self.max_normal_angle, self.smoothing_factor);
         check_range("max_normal_angle", angle, angle >= 0.0, "must be an angle in radians, 0 or more")?;
         check_range("smoothing_factor", factor, (0.0..=1.0).contains(&factor), "must lie between 0 and 1")

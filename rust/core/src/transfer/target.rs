@@ -130,8 +130,9 @@ impl Target {
         report.loose = count(self.expand(self.is_loose()));
         report.unmatched_islands = self.expand_islands(weld, report.unmatched_islands);
         report.welded = self.vertex_count - weld.class_count();
+        let confidence = self.expand(transfer.confidence);
         let (distances, angles) = (self.expand(transfer.distances), self.expand(transfer.angles));
-        Transfer { report: report.counting(&weights), weights, matched, distances, angles }
+        Transfer { report: report.counting(&weights), weights, matched, confidence, distances, angles }
     }
 
     /// Which vertices of the mesh that is solved on have neither triangle nor edge.

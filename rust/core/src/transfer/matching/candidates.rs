@@ -1,5 +1,6 @@
 //! One or several points of the source per target vertex.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::Source;
@@ -67,6 +68,14 @@ impl Candidates {
             points => points.iter().any(|(point, _)| source.is_weighted(point)),
         };
         (0..self.first.len()).into_par_iter().with_min_len(1024).map(has_weight).collect()
+    }
+
+    /// Mean of the points of vertex `i`, world space.
+    pub(super) fn mean_position(&self, source: &Source, i: usize) -> DVec3 {
+        match self.several.of(i) {
+            [] => source.position(&self.first[i]),
+            points => points.iter().map(|(point, share)| source.position(point) * *share).sum(),
+        }
     }
 
     /// Appends the mean of the source's rows at the points of vertex `i`, normalised, in bone order.

@@ -42,6 +42,12 @@ impl Criteria {
         target.diagonal.max(0.3 * source.diagonal())
     }
 
+    /// Whether distance and angle of vertex `i` are within the thresholds.
+    pub(super) fn accepts(&self, matches: &Matches, i: usize) -> bool {
+        let near = matches.points()[i].distance <= self.max_distance;
+        near && (matches.is_wire[i] || self.accepts_angle(matches.angles[i]))
+    }
+
     /// Whether normals at this angle agree; NaN never does.
     pub(super) fn accepts_angle(&self, angle: f32) -> bool {
         self.accepts_upright(angle) || self.match_flipped_normals && PI - f64::from(angle) <= self.max_normal_angle
@@ -63,10 +69,7 @@ pub(super) fn constraints(matches: &Matches, criteria: &Criteria, mask: Option<&
     let is_matched = |i: usize| match mask.map_or(MaskValue::Automatic, |mask| mask[i]) {
         MaskValue::Inpaint => false,
         MaskValue::ForceMatch => matches.weighted[i],
-        MaskValue::Automatic => {
-            let near = matches.points()[i].distance <= criteria.max_distance;
-            matches.weighted[i] && near && (matches.is_wire[i] || criteria.accepts_angle(matches.angles[i]))
-        }
+        MaskValue::Automatic => matches.weighted[i] && criteria.accepts(matches, i),
     };
     let constraint = |i| if is_matched(i) { Constraint::Fixed } else { Constraint::Free };
     (0..matches.points().len()).into_par_iter().with_min_len(1024).map(constraint).collect()

@@ -6,6 +6,7 @@
 
 mod candidates;
 mod closest;
+mod confidence;
 mod upright;
 
 use glam::{DVec3, Vec3};
@@ -16,7 +17,7 @@ pub use closest::Criteria;
 pub(super) use closest::DISTANCE_REFERENCE;
 
 use super::Source;
-use crate::fill::{Constraint, Row};
+use crate::fill::{Constraint, Fill, Row};
 use crate::surface::SurfacePoint;
 
 /// How matching points are found and trusted.
@@ -26,11 +27,13 @@ pub enum MatchMethod {
     /// method.
     #[default]
     ClosestPoint,
+    /// The point nearest in position and direction, trusted over a length that grows with gap and tilt, with no threshold.
+    Confidence,
 }
 
 impl MatchMethod {
     /// All methods, for tests and menus.
-    pub const ALL: [Self; 1] = [Self::ClosestPoint];
+    pub const ALL: [Self; 2] = [Self::ClosestPoint, Self::Confidence];
 }
 
 /// What the artist asks of one vertex.
@@ -68,11 +71,25 @@ impl TargetSurface<'_> {
     }
 }
 
+/// What makes constraints of points, besides the mask.
+#[derive(Debug, Clone, Copy)]
+pub struct Terms<'a> {
+    /// The paper's thresholds.
+    pub criteria: Criteria,
+    /// Lengths of trust as multiples of gaps.
+    pub softness: f64,
+    /// The target's areas, edges and islands.
+    pub fill: &'a Fill,
+}
+
 /// The points of all vertices, found once.
 #[derive(Debug)]
 pub struct Matches {
     method: MatchMethod,
     candidates: Candidates,
+    /// What [`MatchMethod::Confidence`] trusts each vertex by.
+    trust: confidence::Trust,
+    source_size: f64,
     /// Angle between the target's normal and that of the first candidate (V), radians in [0, pi], NaN where one has no length.
     angles: Vec<f32>,
     /// Whether the source has any weight at the candidates (V).
@@ -88,14 +105,16 @@ pub struct Matches {
 impl Matches {
     /// Finds the points of all vertices of `target` on `source`.
     pub fn find(method: MatchMethod, source: &Source, target: TargetSurface<'_>, criteria: &Criteria) -> Self {
-        let candidates = match method {
-            MatchMethod::ClosestPoint => Candidates::one_each(closest::find(source, target)),
+        let (candidates, trust) = match method {
+            MatchMethod::ClosestPoint => (Candidates::one_each(closest::find(source, target)), Default::default()),
+            MatchMethod::Confidence => confidence::find(source, target),
         };
         let points = candidates.first_points().par_iter().with_min_len(1024).enumerate();
         let angles = points.map(|(i, point)| target.angle(source, i, point)).collect();
         let (weighted, is_wire) = (candidates.weighted(source), target.is_wire.to_vec());
         let (criteria, moved) = (*criteria, Vec::new());
-        let mut matches = Self { method, candidates, angles, weighted, is_wire, criteria, moved };
+        let source_size = source.size();
+        let mut matches = Self { method, candidates, trust, source_size, angles, weighted, is_wire, criteria, moved };
         matches.move_flipped(source, target);
         matches
     }
@@ -119,6 +138,8 @@ impl Matches {
             MatchMethod::ClosestPoint => {
                 upright::find(source, target, self.candidates.first_points(), &self.angles, &self.criteria)
             }
+            // Its cost has preferred them already.
+            MatchMethod::Confidence => Vec::new(),
         };
         for (i, point) in found {
             let k = i as usize;
@@ -129,11 +150,34 @@ impl Matches {
         }
     }
 
-    /// What `criteria` and the artist's `mask` (V, automatic everywhere if absent) make of the points, (V).
-    pub fn constraints(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
+    /// What `terms` and the artist's `mask` (V, automatic everywhere if absent) make of the points, (V).
+    pub fn constraints(&self, terms: &Terms<'_>, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
         match self.method {
-            MatchMethod::ClosestPoint => closest::constraints(self, criteria, mask),
+            MatchMethod::ClosestPoint => closest::constraints(self, &terms.criteria, mask),
+            MatchMethod::Confidence => confidence::constraints(self, terms, mask),
         }
+    }
+
+    /// How far each vertex's row is trusted, 0 to 1, given the `constraints` that were made of it (V): all or nothing with
+    /// the paper's method, and where the mask decides.
+    pub fn confidence(&self, constraints: &[Constraint], softness: f64, mask: Option<&[MaskValue]>) -> Vec<f32> {
+        let lengths = self.trust.lengths(softness, self.source_size);
+        let is_automatic = |i: usize| mask.is_none_or(|mask| mask[i] == MaskValue::Automatic);
+        let confidence = |(i, known): (usize, &Constraint)| match lengths.get(i) {
+            Some(&length) if known.is_known() && is_automatic(i) => confidence::confidence(length, self.source_size),
+            _ => f32::from(u8::from(known.is_known())),
+        };
+        constraints.iter().enumerate().map(confidence).collect()
+    }
+
+    /// Mean of the points on the source that vertex `i` takes its row from, world space.
+    pub(super) fn mean_position(&self, source: &Source, i: usize) -> DVec3 {
+        self.candidates.mean_position(source, i)
+    }
+
+    /// Distance to them, and the cosine between the normals; only [`MatchMethod::Confidence`] keeps them.
+    pub(super) fn gap_and_cosine(&self, i: usize) -> (f64, f64) {
+        (self.trust.gap[i], self.trust.cosine[i])
     }
 
     /// The method that found them.
@@ -167,15 +211,20 @@ impl Matches {
         self.weighted = self.candidates.weighted(source);
     }
 
-    /// Appends the weights that vertex `i` takes from the source to `row`: normalised, in bone order.
-    pub fn append_row(&self, source: &Source, i: u32, row: &mut Row) {
-        self.candidates.append_row(source, i as usize, row);
+    /// Appends the weights that vertex `i` takes from the source to `row`: normalised, in bone order. A vertex that the
+    /// mask forces takes those of its first point.
+    pub fn append_row(&self, source: &Source, mask: Option<&[MaskValue]>, i: u32, row: &mut Row) {
+        if mask.is_some_and(|mask| mask[i as usize] == MaskValue::ForceMatch) {
+            source.blend(&self.points()[i as usize], row);
+        } else {
+            self.candidates.append_row(source, i as usize, row);
+        }
     }
 
     /// The smallest distance at which some vertex would match, were the largest one that large.
     pub fn smallest_matching_distance(&self, criteria: &Criteria, mask: Option<&[MaskValue]>) -> Option<f64> {
         let any_distance = Criteria { max_distance: f64::INFINITY, ..*criteria };
-        let possible = self.constraints(&any_distance, mask);
+        let possible = closest::constraints(self, &any_distance, mask);
         let distances = std::iter::zip(self.points(), possible).filter(|(_, known)| *known != Constraint::Free);
         distances.map(|(point, _)| point.distance).min_by(f64::total_cmp)
     }

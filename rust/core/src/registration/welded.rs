@@ -2,9 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
-use super::MERGE_DISTANCE;
 use crate::mesh::TriMesh;
 use crate::weld::Weld;
+
+/// Vertices that are closer than this share of the diagonal are one.
+const MERGE_DISTANCE: f64 = 1e-6;
 
 /// Distinct positions of a mesh.
 #[derive(Debug)]

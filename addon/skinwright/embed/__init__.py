@@ -1,0 +1,124 @@
+"""An armature for meshes that have none: from a template character, or a bare armature."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import jobs, native
+from ..csr import Rows
+from ..declared import native_keywords
+from ..jobs import Jobs
+from ..retarget import bone_names
+from ..retarget.inputs import joined, joined_rows
+from ..scene import armature, embedded, mesh, rest_bones
+from ..scene.error import SceneError
+from ..scene.rest_bones import RestBones
+from .params import EmbedParams
+
+__all__ = ["EmbedParams", "EmbedReport", "embed_armature", "steps"]
+
+# Bones less sure than this are selected, for the artist to look at.
+UNSURE = 0.5
+
+
+@dataclass(frozen=True)
+class EmbedReport:
+    """What an embedding did; `confidence` is of each bone's head, 0 to 1."""
+
+    armature: str
+    meshes: list[str]
+    confidence: dict[str, float]
+    outside: list[str]
+    seconds: float
+    warnings: list[str] = field(default_factory=list)
+
+    def sentence(self) -> str:
+        """The line the artist reads when it is done."""
+        unsure = sum(value < UNSURE for value in self.confidence.values())
+        look = f"{unsure} of them selected, as they need a look" if unsure else "all of them sure"
+        return f"{self.armature}: {len(self.confidence)} bones placed, {look}; {self.seconds:.2f} s"
+
+    def all_warnings(self) -> list[str]:
+        """Sentences worth a look."""
+        return self.warnings
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values only."""
+        return asdict(self) | {"sentence": self.sentence()}
+
+
+def embed_armature(
+    context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: EmbedParams
+) -> EmbedReport:
+    """Put a copy of armature `source` into the meshes `targets`. Nothing that is there is changed, but for `bind`."""
+    return jobs.wait(steps(context, source, targets, params))
+
+
+def steps(
+    context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: EmbedParams
+) -> Jobs[EmbedReport]:
+    """The same, job by job. Nothing is made before all is computed."""
+    bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
+    if not bones.names:
+        raise SceneError(f"{source.name} has no bones: pick the armature of another character")
+    positions, triangles, _ = joined([mesh.read(obj) for obj in targets])
+    options: dict[str, Any] = native_keywords(params)
+    donor: tuple = ()
+    if params.method == "template":
+        donor = _donor(context, source, bones)
+        options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
+    arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
+    embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
+    return _write(context, source, list(targets), bones, embedding, params)
+
+
+def _donor(
+    context: bpy.types.Context, source: bpy.types.Object, bones: RestBones
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], Rows]:
+    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups]
+    if not meshes:
+        raise SceneError(
+            f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "
+            "or set Method to Shape Alone"
+        )
+    positions, triangles, _ = joined([mesh.read(obj) for obj in meshes])
+    return positions, triangles, joined_rows(meshes, bones.names)
+
+
+def mirror(names: list[str]) -> NDArray[np.int32]:
+    """(B,) the bone of the same name on the other side, the bone itself in the middle, -1 if there is none."""
+    place = {(bone_names.without_side(name), bone_names.side(name)): j for j, name in enumerate(names)}
+    other = {"L": "R", "R": "L", "": ""}
+    keys = [(bone_names.without_side(name), other[bone_names.side(name)]) for name in names]
+    return np.array(
+        [j if not key[1] else place.get(key, -1) for j, key in enumerate(keys)],
+        np.int32,
+    )
+
+
+def _write(
+    context: bpy.types.Context,
+    source: bpy.types.Object,
+    targets: list[bpy.types.Object],
+    bones: RestBones,
+    embedding: Any,
+    params: EmbedParams,
+) -> EmbedReport:
+    name = f"{targets[0].name} Rig"
+    confidence = dict(zip(bones.names, embedding.confidence.tolist(), strict=True))
+    places = {b: (h, t) for b, h, t in zip(bones.names, embedding.heads, embedding.tails, strict=True)}
+    rig = embedded.create(context, name, source, bones, places)
+    embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
+    if params.bind:
+        for obj in targets:
+            if armature.find(obj) is None:
+                armature.attach(obj, rig)
+    outside = [bones.names[j] for j in embedding.report["outside"]]
+    warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
+    return EmbedReport(
+        rig.name, [obj.name for obj in targets], confidence, outside, embedding.report["seconds"], warnings
+    )

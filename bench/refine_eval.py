@@ -1,0 +1,273 @@
+"""Refined skin against linear blending, Preserve Volume and Corrective Smooth, all three as Blender computes them.
+
+    python bench/refine_eval.py [--quick] [--out FOLDER]
+
+Tables: a bent and twisted cylinder with two sets of weights and with each constraint off; knee and elbow of a MakeHuman
+body over cell sizes; every character over test poses. Volume is against rest; pairs are pairs of triangles that pass
+through each other, those at rest left out; bulge is the farthest that skin comes from its bones as a multiple of rest.
+Needs bpy, the native module and the characters (SKINWRIGHT_DATA).
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import refine_character as rc
+import skinwright_native as native
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = Path(os.environ.get("SKINWRIGHT_DATA", ROOT.parent / "shared" / "data"))
+BODIES = [
+    "mh_male/body.glb",
+    "mh_female/body.glb",
+    "q_male_peasant/body.glb",
+    "q_female_peasant/body.glb",
+    "qm_men/Casual.glb",
+    "qm_men/Suit.glb",
+    "qm_women/Casual.glb",
+    "animations/mannequin_clips.glb",
+]
+POSES = ["candy", "elbows", "squat", "sit"]
+
+
+def volume(positions, triangles) -> float:
+    """Enclosed by a closed mesh."""
+    a, b, c = (positions[triangles[:, k]].astype(float) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def weld(positions, triangles):
+    """Triangles over first vertices of equal position, so that seams do not count."""
+    _, first, inverse = np.unique(positions, axis=0, return_index=True, return_inverse=True)
+    return first[inverse.ravel()][triangles]
+
+
+class InBlender:
+    """A character as a Blender mesh with an armature of its bones, for what Blender itself makes of a pose."""
+
+    def __init__(self, positions, triangles, weights, parents, segments):
+        import bpy
+
+        self.bpy = bpy
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        mesh = bpy.data.meshes.new("Body")
+        mesh.from_pydata(positions.tolist(), [], triangles.tolist())
+        self.obj = bpy.data.objects.new("Body", mesh)
+        self.rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+        for obj in (self.obj, self.rig):
+            bpy.context.collection.objects.link(obj)
+        bpy.context.view_layer.objects.active = self.rig
+        bpy.ops.object.mode_set(mode="EDIT")
+        bones = [self.rig.data.edit_bones.new(f"b{j}") for j in range(len(parents))]
+        for bone, parent, (head, tail) in zip(bones, parents, segments, strict=True):
+            bone.head, bone.tail = head, tail
+            bone.parent = bones[parent] if parent >= 0 else None
+        bpy.ops.object.mode_set(mode="OBJECT")
+        for j, column in enumerate(weights.T):
+            group = self.obj.vertex_groups.new(name=f"b{j}")
+            for i in np.flatnonzero(column):
+                group.add([int(i)], float(column[i]), "REPLACE")
+        self.armature = self.obj.modifiers.new("Armature", "ARMATURE")
+        self.armature.object = self.rig
+        self.smooth = self.obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
+
+    def posed(self, pose_from_rest, *, preserve_volume=False, smooth=False):
+        """(V, 3) evaluated."""
+        from mathutils import Matrix
+
+        self.armature.use_deform_preserve_volume, self.smooth.show_viewport = preserve_volume, smooth
+        for bone in sorted(self.rig.pose.bones, key=lambda b: len(b.parent_recursive)):
+            turned = Matrix(pose_from_rest[int(bone.name[1:])].tolist())
+            bone.matrix = turned @ bone.bone.matrix_local
+            self.bpy.context.view_layer.update()
+        evaluated = self.obj.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
+        positions = np.empty(len(evaluated.data.vertices) * 3, np.float32)
+        evaluated.data.vertices.foreach_get("co", positions)
+        return positions.reshape(-1, 3)
+
+
+def cylinder(around=40, along=64, radius=0.25):
+    """Positions and triangles of a capped tube along x from -1 to 1."""
+    x, angle = np.linspace(-1, 1, along + 1), np.arange(around) * 2 * np.pi / around
+    rings = [[[u, radius * np.cos(a), radius * np.sin(a)] for a in angle] for u in x]
+    positions = np.array([p for ring in rings for p in ring] + [[-1, 0, 0], [1, 0, 0]], np.float32)
+    triangles, ends = [], (len(positions) - 2, len(positions) - 1)
+    for j in range(around):
+        k = (j + 1) % around
+        for i in range(along):
+            a, b, c, d = i * around + j, i * around + k, (i + 1) * around + j, (i + 1) * around + k
+            triangles += [[a, d, b], [a, c, d]] if (i + j) % 2 else [[a, c, b], [b, c, d]]
+        triangles += [[ends[0], j, k], [ends[1], along * around + k, along * around + j]]
+    return positions, np.array(triangles, np.uint32)[:, ::-1].copy()  # outwards
+
+
+def cylinder_weights(positions) -> dict[str, np.ndarray]:
+    """Inverse distance to the fourth power, and a smooth step within the radius."""
+    x, radius = positions[:, 0].astype(float), np.linalg.norm(positions[:, 1:].astype(float), axis=1)
+    distance = np.stack([np.hypot(np.maximum(x, 0), radius), np.hypot(np.maximum(-x, 0), radius)], 1)
+    inverse = np.maximum(distance, 1e-6) ** -4
+    t = np.clip((x + 0.25) / 0.5, 0, 1)
+    t = t * t * (3 - 2 * t)
+    return {"1/d^4": inverse / inverse.sum(1, keepdims=True), "smoothstep": np.stack([1 - t, t], 1)}
+
+
+def cylinder_table(lines: list[str], quick: bool) -> None:
+    """Every method on every bend."""
+    positions, triangles = cylinder()
+    parents, segments = np.array([-1, 0]), np.array([[[-1, 0, 0], [0, 0, 0]], [[0, 0, 0], [1, 0, 0]]], float)
+    rest = volume(positions, triangles)
+    cases = [("bend", [0, 0, 1], d) for d in (60, 90, 120, 135)] + [("twist", [1, 0, 0], d) for d in (120, 179)]
+    lines += ["## Cylinder", "", "Volume % / pairs / bulge; for the refined ones also inverted tetrahedra in %.", ""]
+    names = ["linear", "Preserve Volume", "Corrective Smooth", "refined, live", "refined, bake"]
+    off = {"stretch": 0, "volume": 0, "bind": 0, "energy": 0, "self_collision": False}
+    lines += ["| | " + " | ".join(names + [f"bake, {name} off" for name in off]) + " |", "|---" * 11 + "|"]
+    for label, weights in cylinder_weights(positions).items():
+        blender = InBlender(positions, triangles, weights, parents, segments)
+        rows = native.Weights.from_dense(weights)
+        make = lambda rows=rows, **k: native.Refiner(positions, triangles, rows, parents, segments, **k)  # noqa: E731
+        refiner, without = make(), {name: make(**{name: value}) for name, value in off.items()}
+        for kind, axis, degrees in cases:
+            pose = np.tile(np.eye(4), (2, 1, 1))
+            pose[1, :3, :3] = rc.about(np.array(axis, float), degrees)
+            shown = [
+                blender.posed(pose),
+                blender.posed(pose, preserve_volume=True),
+                blender.posed(pose, smooth=True),
+            ]
+            cells = [_figures(refiner, pose, x, volume(x, triangles) / rest - 1) for x in shown]
+            for solver, quality in [(refiner, "live"), (refiner, "bake"), *((r, "bake") for r in without.values())]:
+                x = solver.solve(pose, quality=quality)
+                report = solver.report()
+                inverted = report["inverted_tetrahedra"] / max(report["active_tetrahedra"], 1)
+                cells.append(_figures(refiner, pose, x, volume(x, triangles) / rest - 1) + f" / {inverted:.2%}")
+            lines.append(f"| {label}, {kind} {degrees} | " + " | ".join(cells) + " |")
+            print(lines[-1], flush=True)
+        if quick:
+            break
+
+
+def _figures(refiner, pose, positions, lost) -> str:
+    figures = refiner.measure(pose, positions)
+    bulge = max((joint["bulge"] for joint in figures["joints"]), default=1.0)
+    return f"{lost:+.2%} / {figures['pairs']} / {bulge:.2f}"
+
+
+def character_refiner(character, **settings):
+    """The native object of a character."""
+    weights = native.Weights.from_dense(character.weights)
+    arrays = character.positions, character.triangles, weights, character.parents, character.segments
+    return native.Refiner(*arrays, **settings)
+
+
+def joints_table(lines: list[str]) -> None:
+    """Knee and elbow over cell sizes; volume of a ball around the joint, as a share of what it holds at rest."""
+    import igl
+
+    winding = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
+    character = rc.read(DATA / "mh_male/body.glb")
+    triangles = weld(character.positions, character.triangles)
+    rest, diagonal = volume(character.positions, triangles), np.linalg.norm(np.ptp(character.positions, axis=0))
+    lines += ["", "## Joints of mh_male", "", "Volume of the region / pairs / bulge / inverted.", ""]
+    lines += ["| joint | cell | limit | linear | live | bake |", "|---|---|---|---|---|---|"]
+    for name, degrees, radius in (("calf_l", 120, 0.3), ("lowerarm_l", 60, 0.2), ("lowerarm_l", 90, 0.2)):
+        joint = character.bones.index(name)
+        pose = rc.rotated(character, joint, _flexion(character, joint, degrees))
+        points = np.random.default_rng(0).uniform(-radius, radius, (40000, 3))
+        points = points[np.linalg.norm(points, axis=1) < radius] + character.segments[joint, 0]
+        inside = winding(character.positions.astype(float), triangles.astype(np.int64), points) > 0.5
+        region = inside.mean() * 4 / 3 * np.pi * radius**3
+        for cell in (0.8, 1.0, 1.25):
+            for limit in (1.08, 1.10):
+                refiner = character_refiner(character, cell=0.015 * diagonal * cell, bind=limit)
+                cells = []
+                for quality in (None, "live", "bake"):
+                    linear = native.linear_blend(
+                        character.positions, native.Weights.from_dense(character.weights), pose
+                    )
+                    x = refiner.solve(pose, quality=quality) if quality else linear
+                    report = refiner.report() if quality else None
+                    cells.append(_figures(refiner, pose, x, (volume(x, triangles) - rest) / region))
+                    if report:
+                        cells[-1] += f" / {report['inverted_tetrahedra'] / max(report['active_tetrahedra'], 1):.2%}"
+                lines.append(f"| {name} {degrees} | {cell} | {limit} | " + " | ".join(cells) + " |")
+                print(lines[-1], flush=True)
+
+
+def _flexion(character, joint: int, degrees: float) -> np.ndarray:
+    """The rotation that bends a joint further the way it is bent at rest."""
+    head, tail = character.segments[joint]
+    parent = character.parents[joint]
+    up, down = character.segments[parent, 0] - head, tail - head
+    axis = np.cross(up, down)
+    straight = np.linalg.norm(axis) < 0.05 * np.linalg.norm(up) * np.linalg.norm(down)
+    axis = np.array([1.0, 0, 0]) if straight else axis
+    closer = rc.about(axis, 5) @ down @ up > down @ up
+    return rc.about(axis, degrees if closer else -degrees)
+
+
+def characters_table(lines: list[str], quick: bool) -> None:
+    """All bodies over the test poses."""
+    conventions = json.loads((DATA / "poses.json").read_text())
+    lines += ["", "## Characters", ""]
+    lines += ["New pairs / volume % / 99.9 % quantile of edge stretch; ms is the wall time of one solve.", ""]
+    lines += ["| body | pose | linear | Preserve Volume | live | ms | bake | ms |", "|---|---|---|---|---|---|---|---|"]
+    for path in BODIES[:2] if quick else BODIES:
+        character = rc.read(DATA / path)
+        triangles = weld(character.positions, character.triangles).astype(np.uint32)
+        triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+        at_rest = {tuple(pair) for pair in native.intersecting_pairs(character.positions, triangles).tolist()}
+        refiner, weights = character_refiner(character), native.Weights.from_dense(character.weights)
+        for name in POSES:
+            pose = rc.pose(character, conventions["poses"][name], conventions)
+            shown = [
+                native.linear_blend(character.positions, weights, pose),
+                native.dual_quaternion_blend(character.positions, weights, pose),
+            ]
+            times = []
+            for quality in ("live", "bake"):
+                start = time.perf_counter()
+                shown.append(refiner.solve(pose, quality=quality))
+                times.append(f"{(time.perf_counter() - start) * 1e3:.0f}")
+            cells = [_of_body(character, triangles, at_rest, x) for x in shown]
+            row = [path, name, cells[0], cells[1], cells[2], times[0], cells[3], times[1]]
+            lines.append("| " + " | ".join(row) + " |")
+            print(lines[-1], flush=True)
+
+
+def _of_body(character, triangles, at_rest, positions) -> str:
+    pairs = {tuple(pair) for pair in native.intersecting_pairs(positions, triangles).tolist()} - at_rest
+    lost = volume(positions, triangles) / volume(character.positions, triangles) - 1
+    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0)
+    lengths = [np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1) for x in (character.positions, positions)]
+    stretch = np.quantile(lengths[1] / np.maximum(lengths[0], 1e-9), 0.999)
+    return f"{len(pairs)} / {lost:+.2%} / {stretch:.2f}"
+
+
+def main() -> None:
+    """All tables, printed as they come and written at the end."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="one set of weights, two bodies")
+    parser.add_argument("--only", choices=["cylinder", "joints", "characters"], help="one table")
+    parser.add_argument("--out", type=Path, default=ROOT / "bench" / "refine_results.md", help="file of the tables")
+    options = parser.parse_args()
+    tables = {
+        "cylinder": lambda lines: cylinder_table(lines, options.quick),
+        "joints": joints_table,
+        "characters": lambda lines: characters_table(lines, options.quick),
+    }
+    lines = ["# Refined skin", ""]
+    for name, table in tables.items():
+        if options.only in (None, name):
+            table(lines)
+    options.out.write_text("\n".join(lines) + "\n")
+    print(f"written to {options.out}")
+    sys.stdout.flush()
+    os._exit(0)  # some bpy wheels hang when Python ends in the ordinary way
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+//! Every vertex has a row, trusted over a length that grows with its gap and its tilt.
+//!
+//! A vertex takes the point that is nearest in position and direction: the least `|x - y|^2 + mu^2 |n - n'|^2` over the
+//! source's points y, n and n' the unit normals. Its row is data with confidence `b = 4 M / h^2`, M the vertex's area and h the
+//! length, in the harmonic energy `w' S w`, which is solved twice. A wave of wavelength 2 pi h is damped to 0.64 of its height,
+//! shorter ones vanish and longer ones stay. On the skin h vanishes and the row is copied; a hand's breadth away it says only
+//! what the wider surroundings should be on average.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{Candidates, MaskValue, Matches, TargetSurface, Terms};
+use crate::adjacency::NONE;
+use crate::fill::Constraint;
+use crate::surface::{Bound, Priced, SurfacePoint};
+use crate::transfer::Source;
+
+/// mu: opposite normals cost as much as a distance of twice this share of the source's size.
+const DIRECTION: f64 = 0.015;
+/// The closest point is left only for one that costs less than this share of its own cost: where little is to be gained,
+/// neighbours would choose differently.
+const HYSTERESIS: f64 = 0.8;
+/// Spread of the costs, as a share of the least, that are averaged as a tie; nothing beyond this times sqrt(12) counts.
+const TIE: f64 = 0.15;
+const SLACK: f64 = 1.0 + 12.0 * TIE * TIE;
+/// Shares of the source's size: what is a tie of distances, and what is added to each length.
+const EQUALLY_NEAR: f64 = 1e-6;
+const FLOOR: f64 = 1e-3;
+/// Softness relative to the gap where both normals agree.
+const GAP: f64 = 1.0;
+/// How fast the tangent of the angle between the normals adds to it.
+const TILT: f64 = 3.0;
+/// Cosines below this count as this.
+const LEAST_COSINE: f64 = 0.05;
+/// A vertex is held at its row if it is trusted over less than this share of its shortest edge: smoothing over so little
+/// changes nothing that the mesh can show.
+const HELD: f64 = 0.25;
+/// Length, as a share of the source's size, at which a vertex is trusted by half.
+const HALF_TRUSTED: f64 = 0.02;
+
+/// What the lengths are made of, (V) each; empty with other methods.
+#[derive(Debug, Default)]
+pub(super) struct Trust {
+    /// Distance to the point that was chosen, world units.
+    pub gap: Vec<f64>,
+    /// Cosine between the normals there.
+    pub cosine: Vec<f64>,
+}
+
+impl Trust {
+    /// Lengths h over which the rows are trusted, world units (V).
+    pub fn lengths(&self, softness: f64, size: f64) -> Vec<f64> {
+        let floor = |gap: f64| (FLOOR * size).min(gap / 2.0) + EQUALLY_NEAR * size;
+        let length = |(&gap, &cosine): (&f64, &f64)| softness * growth(gap, cosine) + floor(gap);
+        std::iter::zip(&self.gap, &self.cosine).map(length).collect()
+    }
+}
+
+/// How far a row with length h is trusted, 0 to 1; `size` is the source's.
+pub(super) fn confidence(length: f64, size: f64) -> f32 {
+    (1.0 / (1.0 + (length / (HALF_TRUSTED * size)).powi(2))) as f32
+}
+
+/// The point chosen for one vertex, several if they tie.
+struct Choice {
+    points: Vec<(SurfacePoint, f64)>,
+    gap: f64,
+    cosine: f64,
+}
+
+/// The closest point of each vertex, and what it takes its row from instead.
+pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, Trust) {
+    let size = source.size();
+    let closest = source.index().closest_points(target.positions);
+    let cosine = |i: usize, point: &SurfacePoint| {
+        let cosine = cosine(source, point, target.normals[i]);
+        if target.two_sided[i] { cosine.map(f64::abs) } else { cosine }
+    };
+    let cost = |i: usize, point: &SurfacePoint| cost(point.distance, cosine(i, point), size);
+    let bound = |(i, point): (usize, &SurfacePoint)| {
+        let own = cost(i, point);
+        let near = point.distance + EQUALLY_NEAR * size;
+        let cost = if may_move(own, point.distance, size) { SLACK * HYSTERESIS * own } else { 0.0 };
+        Bound { near: near * near, cost }
+    };
+    let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
+    let finish = |i: usize, found: &[Priced]| {
+        let priced: Vec<(Priced, f64)> = found.iter().map(|&p| (p, cosine(i, &p.point).unwrap_or(1.0))).collect();
+        choose(source, &priced, closest[i].distance, size)
+    };
+    let choices = source.index().cheapest_points(target.positions, &bounds, SLACK, cost, finish);
+    let gap: Vec<f64> = choices.iter().map(|choice| choice.gap).collect();
+    let cosine = choices.iter().map(|choice| choice.cosine).collect();
+    let all: Vec<_> = choices.into_iter().map(|choice| choice.points).collect();
+    (Candidates::several(closest, &all), Trust { gap, cosine })
+}
+
+/// Cost of a point at a distance whose normal has a cosine with the vertex's; without a normal only distance counts.
+fn cost(distance: f64, cosine: Option<f64>, size: f64) -> f64 {
+    let direction = DIRECTION * size;
+    distance * distance + 2.0 * direction * direction * (1.0 - cosine.unwrap_or(1.0))
+}
+
+/// Cosine between a vertex's normal and the source's normal at `point`, None where either has no length.
+fn cosine(source: &Source, point: &SurfacePoint, normal: Vec3) -> Option<f64> {
+    let corners = source.triangles()[point.triangle as usize];
+    let blend: DVec3 = std::iter::zip(corners, point.barycentric)
+        .map(|(i, share)| source.normals()[i as usize].as_dvec3() * share)
+        .sum();
+    let normal = normal.as_dvec3();
+    let lengths = blend.length() * normal.length();
+    (lengths > 0.0).then(|| (blend.dot(normal) / lengths).clamp(-1.0, 1.0))
+}
+
+/// Whether a point with this cost can be left: no other costs less than the squared distance of the closest one. Nothing is
+/// gained on the skin itself, where both are rounding errors.
+fn may_move(cost: f64, distance: f64, size: f64) -> bool {
+    HYSTERESIS * cost > distance * distance && cost.sqrt() - distance > 1e-3 * DIRECTION * size
+}
+
+/// Keeps the nearest points unless others cost clearly less, and averages what ties.
+fn choose(source: &Source, found: &[(Priced, f64)], distance: f64, size: f64) -> Choice {
+    let near = (distance + EQUALLY_NEAR * size).powi(2);
+    let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
+    let least = |among: &dyn Fn(&Priced) -> bool| {
+        found.iter().filter(|(p, _)| among(p)).map(|(p, _)| p.cost).fold(f64::INFINITY, f64::min)
+    };
+    let (least_near, least_of_all) = (least(&is_near), least(&|_| true));
+    let moves = may_move(least_near, distance, size) && least_of_all < HYSTERESIS * least_near;
+    let best = if moves { least_of_all } else { least_near };
+    let smallest = (EQUALLY_NEAR * size).powi(2);
+    let tied = found.iter().filter(|(p, _)| (moves || is_near(p)) && p.cost <= SLACK * best + smallest);
+    let weight =
+        |p: &Priced| source.area(p.point.triangle) * (-(p.cost - best) / (2.0 * TIE * TIE * (best + smallest))).exp();
+    let weighed: Vec<_> = tied.map(|&(p, cosine)| (p.point, weight(&p), cosine)).collect();
+    let sum: f64 = weighed.iter().map(|&(_, weight, _)| weight).sum();
+    let share = |weight: f64| if sum > 0.0 { weight / sum } else { 1.0 / weighed.len() as f64 };
+    let gap = weighed.iter().map(|(point, weight, _)| share(*weight) * point.distance).sum();
+    let cosine = weighed.iter().map(|(_, weight, cosine)| share(*weight) * cosine).sum();
+    let mut points: Vec<_> = weighed.iter().map(|&(point, weight, _)| (point, share(weight))).collect();
+    if points.windows(2).all(|pair| are_one(source, &pair[0].0, &pair[1].0)) {
+        points.truncate(1);
+        points.iter_mut().for_each(|(_, share)| *share = 1.0);
+    }
+    Choice { points, gap, cosine }
+}
+
+/// Whether two triangles' points lie on the same corner or side.
+fn are_one(source: &Source, first: &SurfacePoint, second: &SurfacePoint) -> bool {
+    let support = |point: &SurfacePoint| {
+        let corners = source.triangles()[point.triangle as usize];
+        let mut support: Vec<(u32, f64)> =
+            std::iter::zip(corners, point.barycentric).filter(|&(_, share)| share > 1e-6).collect();
+        support.sort_unstable_by_key(|&(i, _)| i);
+        support
+    };
+    let (first, second) = (support(first), support(second));
+    first.len() == second.len() && std::iter::zip(first, second).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-6)
+}
+
+/// Gap and tilt as one length, which softness multiplies. Normals that point the opposite way are those of linings, and no tilt.
+fn growth(gap: f64, cosine: f64) -> f64 {
+    let cosine = cosine.abs().max(LEAST_COSINE);
+    gap * (GAP + TILT * (1.0 / (cosine * cosine) - 1.0))
+}
+
+/// Soft rows, held where the length is far below the mesh's edges. An island on which the paper's thresholds accept no vertex
+/// hangs on the garment instead: a plate over a joint follows the piece it is fastened to.
+pub(super) fn constraints(matches: &Matches, terms: &Terms<'_>, mask: Option<&[MaskValue]>) -> Vec<Constraint> {
+    let reached = reached_islands(matches, terms, mask);
+    let lengths = matches.trust.lengths(terms.softness, matches.source_size);
+    let constraint = |i: usize| match mask.map_or(MaskValue::Automatic, |mask| mask[i]) {
+        _ if !matches.weighted[i] => Constraint::Free,
+        MaskValue::Inpaint => Constraint::Free,
+        MaskValue::ForceMatch => Constraint::Fixed,
+        MaskValue::Automatic => match terms.fill.islands().of_vertex()[i] {
+            NONE => Constraint::Free,
+            island if !reached[island as usize] => Constraint::Free,
+            _ => soft(terms, i, lengths[i]),
+        },
+    };
+    (0..lengths.len()).into_par_iter().with_min_len(1024).map(constraint).collect()
+}
+
+/// Which islands have a vertex that the paper would match, or that the mask forces; all of them if none has, for then there is
+/// nothing to hang on.
+fn reached_islands(matches: &Matches, terms: &Terms<'_>, mask: Option<&[MaskValue]>) -> Vec<bool> {
+    let mut reached = vec![false; terms.fill.islands().count()];
+    for (i, &island) in terms.fill.islands().of_vertex().iter().enumerate().filter(|&(_, &island)| island != NONE) {
+        let forced = mask.is_some_and(|mask| mask[i] == MaskValue::ForceMatch);
+        if !reached[island as usize] && matches.weighted[i] && (forced || terms.criteria.accepts(matches, i)) {
+            reached[island as usize] = true;
+        }
+    }
+    if !reached.contains(&true) {
+        reached.fill(true);
+    }
+    reached
+}
+
+fn soft(terms: &Terms<'_>, i: usize, length: f64) -> Constraint {
+    let (mesh, laplacian) = (terms.fill.mesh(), terms.fill.laplacian());
+    let here = mesh.position(i as u32);
+    let edges = laplacian.neighbours(i).iter().map(|&j| mesh.position(j).distance(here));
+    if length < HELD * edges.fold(f64::INFINITY, f64::min) {
+        return Constraint::Fixed;
+    }
+    Constraint::Soft(4.0 * laplacian.mass(i) / (length * length))
+}

@@ -1,0 +1,269 @@
+//! Refinement: gradients by finite differences, kernels against their scalar twin, the bent cylinder, threads, bad input.
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use skinwright_core::refine::constraint::{Axis, HalfSpace, bind, energy, self_collision, stretch, volume};
+use skinwright_core::refine::projection::{Batch, Colouring, Energy, Kernel, Particle, Stretch, Volume, project};
+use skinwright_core::refine::{Quality, Refiner, Settings, intersecting_pairs};
+use skinwright_core::skinning::pose_from_matrices;
+use skinwright_core::{Error, Progress, TriMesh, Weights};
+
+const CORNERS: [[f64; 3]; 4] = [[0.1, 0.2, -0.1], [1.3, 0.0, 0.2], [0.2, 0.9, 0.1], [-0.1, 0.3, 1.4]];
+
+/// Central differences of `value` at each coordinate.
+fn differences<const N: usize>(points: [[f64; 3]; N], value: impl Fn([[f64; 3]; N]) -> f64) -> [[f64; 3]; N] {
+    let step = 1e-6;
+    let mut gradient = [[0.0; 3]; N];
+    for n in 0..N {
+        for c in 0..3 {
+            let (mut more, mut less) = (points, points);
+            more[n][c] += step;
+            less[n][c] -= step;
+            gradient[n][c] = (value(more) - value(less)) / (2.0 * step);
+        }
+    }
+    gradient
+}
+
+fn assert_close<const N: usize>(found: [[f64; 3]; N], expected: [[f64; 3]; N]) {
+    for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((found - expected).abs() < 1e-6, "{found} against {expected}");
+    }
+}
+
+#[test]
+fn gradients_are_derivatives() {
+    let ends = [CORNERS[0], CORNERS[1]];
+    assert_close(stretch(ends, 0.7).gradient, differences(ends, |p| stretch(p, 0.7).value));
+    assert_close(volume(CORNERS, 0.1).gradient, differences(CORNERS, |p| volume(p, 0.1).value));
+    let arms = [0.5, 0.8, 0.6, 0.9];
+    assert_close(energy(CORNERS, arms).gradient, differences(CORNERS, |p| energy(p, arms).value));
+}
+
+#[test]
+fn one_hard_projection_solves_a_single_stretch_and_soft_ones_settle_at_their_compliance() {
+    let ends = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    let hard = stretch(ends, 1.0).project([1.0, 1.0], 0.0, 0.0);
+    assert!((hard.moves[0][0] - 0.5).abs() < 1e-9 && (hard.moves[1][0] + 0.5).abs() < 1e-9);
+    // min |x - x0|^2 / 2 + C^2 / (2 alpha) leaves C = alpha C0 / (alpha + 2).
+    let (mut points, mut multiplier) = (ends, 0.0);
+    for _ in 0..50 {
+        let step = stretch(points, 1.0).project([1.0, 1.0], 3.0, multiplier);
+        multiplier += step.multiplier;
+        for (point, by) in points.iter_mut().zip(step.moves) {
+            (0..3).for_each(|c| point[c] += by[c]);
+        }
+    }
+    assert!((stretch(points, 1.0).value - 3.0 / 5.0).abs() < 1e-6);
+}
+
+#[test]
+fn bind_is_one_sided_and_planes_leave_their_own_side_alone() {
+    let axis = Axis { origin: Vec3::ZERO, directions: [-Vec3::X, Vec3::X] };
+    assert_eq!(bind(&axis, Vec3::new(0.3, 0.9, 0.0), 0.0, 1.0), Vec3::ZERO);
+    let back = bind(&axis, Vec3::new(0.3, 2.0, 0.0), 0.0, 1.0);
+    assert!((back - Vec3::new(0.0, -1.0, 0.0)).length() < 1e-6);
+    let plane = HalfSpace { origin: Vec3::ZERO, normal: Vec3::X, gap: 0.1 };
+    assert_eq!(self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), 1.0), Vec3::ZERO);
+    assert!((self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), -1.0) - Vec3::new(-0.3, 0.0, 0.0)).length() < 1e-6);
+}
+
+/// Deterministic numbers from -0.5 to 0.5.
+fn noise(seed: u32) -> f32 {
+    let mut x = seed.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x2c1b_3c6d);
+    x ^= x >> 12;
+    (x >> 8) as f32 / (1u32 << 24) as f32 - 0.5
+}
+
+#[test]
+fn lanes_have_the_bits_of_the_scalar_twin_and_batches_share_no_particle() {
+    let count = 3000u32;
+    let particles: Vec<Particle> =
+        (0..count).map(|i| [noise(3 * i), noise(3 * i + 1), noise(3 * i + 2), (i % 7 != 0) as u8 as f32]).collect();
+    let corner = |k: u32, n: u32| (k * 37 + n * 811 + k * k % 97) % count;
+    let fours: Vec<[u32; 4]> = (0..5000).map(|k| [0, 1, 2, 3].map(|n| corner(k, n))).collect();
+    let twos: Vec<[u32; 2]> = (0..5000).map(|k| [corner(k, 0), corner(k, 1)]).collect();
+    let (order, pairs) = (Colouring::new(&fours, count as usize), Colouring::new(&twos, count as usize));
+    let mut from = 0;
+    for &end in &order.ends {
+        let mut used: Vec<u32> = order.order[from..end as usize].iter().flat_map(|&k| fours[k as usize]).collect();
+        let all = used.len();
+        used.sort_unstable();
+        used.dedup();
+        assert_eq!(used.len(), all);
+        from = end as usize;
+    }
+    let run = |kernel| {
+        let mut particles = particles.clone();
+        let mut edges = Batch::new(&pairs, |k| twos[k as usize], |_| [0.3]);
+        let mut volumes = Batch::new(&order, |k| fours[k as usize], |_| [0.02, 0.005]);
+        let mut springs = Batch::new(&order, |k| fours[k as usize], |_| [0.3; 4]);
+        for _ in 0..3 {
+            project(kernel, Stretch(1.0), &mut edges, &mut particles);
+            project(kernel, Volume(0.1), &mut volumes, &mut particles);
+            project(kernel, Energy(2.0), &mut springs, &mut particles);
+        }
+        particles.into_flattened().into_iter().map(f32::to_bits).collect::<Vec<_>>()
+    };
+    assert_eq!(run(Kernel::Lanes), run(Kernel::Scalar));
+}
+
+struct Limb {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    weights: Weights,
+}
+
+/// A capped tube of radius 0.25 along x from -1 to 1, with weights that change sides smoothly within 0.25 of the middle.
+fn limb(around: usize, along: usize) -> Limb {
+    let mut positions = Vec::new();
+    for i in 0..=along {
+        for j in 0..around {
+            let angle = std::f32::consts::TAU * j as f32 / around as f32;
+            positions.push([2.0 * i as f32 / along as f32 - 1.0, 0.25 * angle.cos(), 0.25 * angle.sin()]);
+        }
+    }
+    let ends = [positions.len() as u32, positions.len() as u32 + 1];
+    positions.extend([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    let at = |i: usize, j: usize| (i * around + j % around) as u32;
+    let mut triangles = Vec::new();
+    for j in 0..around {
+        for i in 0..along {
+            let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
+            triangles.extend([[a, b, d], [a, d, c]]);
+        }
+        triangles.extend([[ends[0], at(0, j + 1), at(0, j)], [ends[1], at(along, j), at(along, j + 1)]]);
+    }
+    let (mut indptr, mut bones, mut values) = (vec![0u32], Vec::new(), Vec::new());
+    for p in &positions {
+        let t = ((p[0] + 0.25) / 0.5).clamp(0.0, 1.0);
+        let t = t * t * (3.0 - 2.0 * t);
+        bones.extend([0, 1]);
+        values.extend([1.0 - t, t]);
+        indptr.push(bones.len() as u32);
+    }
+    let weights = Weights::new(indptr, bones, values, 2).unwrap();
+    Limb { positions, triangles, weights }
+}
+
+const SEGMENTS: [[[f64; 3]; 2]; 2] = [[[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+
+fn refiner(limb: &Limb, settings: Settings) -> skinwright_core::Result<Refiner> {
+    let mesh = TriMesh::new(&limb.positions, &limb.triangles, "limb")?;
+    Refiner::new(&mesh, &limb.weights, &[-1, 0], &SEGMENTS, settings, &Progress::default())
+}
+
+fn turned(axis: DVec3, degrees: f64) -> Vec<DAffine3> {
+    let matrix3 = DMat3::from_axis_angle(axis, degrees.to_radians());
+    vec![DAffine3::IDENTITY, DAffine3 { matrix3, translation: DVec3::ZERO }]
+}
+
+fn enclosed(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> f64 {
+    let at = |i: u32| Vec3::from(positions[i as usize]).as_dvec3();
+    triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
+}
+
+#[test]
+fn a_bent_limb_keeps_its_volume_and_leaves_itself_alone() {
+    let limb = limb(28, 44);
+    let refiner = refiner(&limb, Settings { cell: Some(0.05), ..Settings::default() }).unwrap();
+    let rest = enclosed(&limb.positions, &limb.triangles);
+    assert!(rest > 0.0);
+    for (axis, degrees) in [(DVec3::Z, 90.0), (DVec3::Z, 120.0), (DVec3::X, 120.0), (DVec3::X, 179.0)] {
+        let (refined, report) =
+            refiner.solve_with_report(&turned(axis, degrees), Quality::Bake, Kernel::Lanes).unwrap();
+        assert!((enclosed(&refined, &limb.triangles) / rest - 1.0).abs() < 0.01, "{axis} {degrees}");
+        assert_eq!(intersecting_pairs(&refined, &limb.triangles), Vec::<[u32; 2]>::new(), "{axis} {degrees}");
+        assert!(report.joints[0].bulge_after < 1.0801);
+        assert!(report.inverted_tetrahedra * 200 <= report.active_tetrahedra);
+    }
+}
+
+#[test]
+fn frames_depend_on_nothing_but_their_pose() {
+    let limb = limb(20, 30);
+    let refiner = refiner(&limb, Settings::default()).unwrap();
+    let (bent, other) = (turned(DVec3::Z, 100.0), turned(DVec3::Y, -70.0));
+    let solve = |threads: usize, pose: &[DAffine3]| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| refiner.solve(pose, Quality::Bake).unwrap())
+    };
+    let first = solve(1, &bent);
+    solve(2, &other);
+    assert_eq!(first, solve(2, &bent));
+    assert_eq!(first, solve(5, &bent));
+    let (twin, _) = refiner.solve_with_report(&bent, Quality::Bake, Kernel::Scalar).unwrap();
+    assert_eq!(first, twin);
+}
+
+#[test]
+fn each_constraint_can_be_switched_off_and_changes_something() {
+    let limb = limb(20, 30);
+    let solve = |settings: Settings| {
+        let refiner = refiner(&limb, settings).unwrap();
+        refiner.solve(&turned(DVec3::Z, 110.0), Quality::Live).unwrap()
+    };
+    let all = Settings::default();
+    let with_all = solve(all);
+    for off in [
+        Settings { stretch: 0.0, ..all },
+        Settings { volume: 0.0, ..all },
+        Settings { bind: 0.0, ..all },
+        Settings { energy: 0.0, ..all },
+        Settings { self_collision: false, ..all },
+    ] {
+        assert_ne!(solve(off), with_all, "{off:?}");
+    }
+}
+
+#[test]
+fn rest_stays_at_rest() {
+    let limb = limb(12, 16);
+    let refiner = refiner(&limb, Settings::default()).unwrap();
+    assert_eq!(refiner.solve(&turned(DVec3::Z, 0.0), Quality::Bake).unwrap(), limb.positions);
+}
+
+#[test]
+fn open_split_and_overlapping_limbs_are_refined() {
+    let whole = limb(16, 20);
+    let open = Limb { triangles: whole.triangles[..whole.triangles.len() - 40].to_vec(), ..limb(16, 20) };
+    let split = Limb {
+        positions: whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect(),
+        triangles: (0..whole.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        weights: {
+            let rows: Vec<_> = whole.triangles.iter().flatten().map(|&i| whole.weights.row(i as usize)).collect();
+            let indptr = (0..=rows.len() as u32).map(|i| 2 * i).collect();
+            let bones = rows.iter().flat_map(|row| row.0).copied().collect();
+            Weights::new(indptr, bones, rows.iter().flat_map(|row| row.1).copied().collect(), 2).unwrap()
+        },
+    };
+    let pose = turned(DVec3::Z, 90.0);
+    let refined = |limb: &Limb| refiner(limb, Settings::default()).unwrap().solve(&pose, Quality::Bake).unwrap();
+    assert!(refined(&open).iter().flatten().all(|x| x.is_finite()));
+    let (joined, apart) = (refined(&whole), refined(&split));
+    for (corner, &i) in apart.iter().zip(whole.triangles.iter().flatten()) {
+        assert!(Vec3::from(*corner).distance(Vec3::from(joined[i as usize])) < 1e-4);
+    }
+}
+
+#[test]
+fn bad_input_is_a_sentence() {
+    let good = limb(12, 12);
+    let flat = Limb { positions: good.positions.iter().map(|p| [p[0], p[1], 0.0]).collect(), ..limb(12, 12) };
+    assert!(matches!(refiner(&flat, Settings::default()), Err(Error::NothingInside)));
+    let point = Limb { positions: vec![[0.0; 3]; good.positions.len()], ..limb(12, 12) };
+    assert!(matches!(refiner(&point, Settings::default()), Err(Error::NothingInside)));
+    let mut broken = limb(12, 12);
+    broken.positions[3][1] = f32::NAN;
+    assert!(matches!(refiner(&broken, Settings::default()), Err(Error::PositionNotFinite { vertex: 3, .. })));
+    let inverted = refiner(&good, Settings { bind: 0.5, ..Settings::default() });
+    assert!(matches!(inverted, Err(Error::InvalidParameter { name: "bind", .. })));
+    let tiny = refiner(&good, Settings { cell: Some(1e-6), ..Settings::default() });
+    assert!(matches!(tiny, Err(Error::InvalidParameter { name: "cell", .. })));
+    let many = Limb { positions: vec![[0.0; 3]; 2_000_001], ..limb(12, 12) };
+    assert!(matches!(refiner(&many, Settings::default()), Err(Error::TooManyVertices { .. })));
+    let poses = pose_from_matrices(&[[[1.0; 4]; 4]; 3]).unwrap();
+    let refined = refiner(&good, Settings::default()).unwrap().solve(&poses, Quality::Live);
+    assert!(matches!(refined, Err(Error::LengthMismatch { .. })));
+}
