@@ -102,7 +102,7 @@ def cylinder(around=40, along=64, radius=0.25):
             a, b, c, d = i * around + j, i * around + k, (i + 1) * around + j, (i + 1) * around + k
             triangles += [[a, d, b], [a, c, d]] if (i + j) % 2 else [[a, c, b], [b, c, d]]
         triangles += [[ends[0], j, k], [ends[1], along * around + k, along * around + j]]
-    return positions, np.array(triangles, np.uint32)
+    return positions, np.array(triangles, np.uint32)[:, ::-1].copy()  # outwards
 
 
 def cylinder_weights(positions) -> dict[str, np.ndarray]:

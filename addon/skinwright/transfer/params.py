@@ -143,7 +143,7 @@ class TransferParams(Params):
         1e-6,
         "Weld",
         "Vertices closer than this part of the target's diagonal are one, as at seams of imported files; 0 for none",
-        most=0.1,
+        most=0.01,
         soft_most=1e-3,
         precision=6,
         step=0.01,

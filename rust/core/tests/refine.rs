@@ -41,7 +41,7 @@ fn gradients_are_derivatives() {
 
 #[test]
 fn one_hard_projection_solves_a_single_stretch_and_soft_ones_settle_at_their_compliance() {
-    let ends = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    let ends: [[f64; 3]; 2] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
     let hard = stretch(ends, 1.0).project([1.0, 1.0], 0.0, 0.0);
     assert!((hard.moves[0][0] - 0.5).abs() < 1e-9 && (hard.moves[1][0] + 0.5).abs() < 1e-9);
     // min |x - x0|^2 / 2 + C^2 / (2 alpha) leaves C = alpha C0 / (alpha + 2).
@@ -131,9 +131,9 @@ fn limb(around: usize, along: usize) -> Limb {
     for j in 0..around {
         for i in 0..along {
             let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
-            triangles.extend([[a, d, b], [a, c, d]]);
+            triangles.extend([[a, b, d], [a, d, c]]);
         }
-        triangles.extend([[ends[0], at(0, j), at(0, j + 1)], [ends[1], at(along, j + 1), at(along, j)]]);
+        triangles.extend([[ends[0], at(0, j + 1), at(0, j)], [ends[1], at(along, j), at(along, j + 1)]]);
     }
     let (mut indptr, mut bones, mut values) = (vec![0u32], Vec::new(), Vec::new());
     for p in &positions {

@@ -74,6 +74,9 @@ impl Assembled {
     }
 }
 
+/// Positions (V, 3), triangles (T, 3) and edges (E, 2) of a mesh.
+pub type Arrays<'a> = (&'a [[f32; 3]], &'a [[u32; 3]], &'a [[u32; 2]]);
+
 impl Fill {
     /// Prepares a mesh (V positions, T triangles). Vertices that `weld` declares to be one are one in the system: S and M
     /// are assembled on the welded triangles, without those that welding makes degenerate or equal, so that the answer is to
@@ -132,7 +135,7 @@ impl Fill {
     }
 
     /// The mesh that is solved on with all of its triangles and edges: positions, (T, 3), (E, 2).
-    pub fn arrays(&self) -> (&[[f32; 3]], &[[u32; 3]], &[[u32; 2]]) {
+    pub fn arrays(&self) -> Arrays<'_> {
         (&self.positions, self.all_triangles.as_ref().unwrap_or(&self.triangles), &self.edges)
     }
 

@@ -16,7 +16,7 @@ use crate::progress::Progress;
 /// How much each penalty counts.
 const LENGTH: f64 = 1.0;
 const DIRECTION: f64 = 0.6;
-const POSITION: f64 = 4.0;
+const POSITION: f64 = 0.6;
 const DETOUR: f64 = 1.0;
 const NOT_AN_END: f64 = 1.5;
 const SHARED_WAY: f64 = 3.0;

@@ -10,7 +10,7 @@ use super::symmetry::{Side, Symmetry};
 use super::ways::Points;
 use crate::adjacency::NONE;
 use crate::error::Result;
-use crate::inside::{Lattice, Winding};
+use crate::inside::Winding;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
@@ -19,9 +19,6 @@ const HANGING: f32 = 0.9;
 
 /// Bones stretch by no more than this, either way, to what hangs on them.
 const MOST_STRETCH: f64 = 2.0;
-
-/// Cells by which a head may lie outside to be moved in.
-const DRAWN_IN: f64 = 4.0;
 
 /// What moves a bone and all that hangs on it.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +59,6 @@ pub(super) fn expand(
     points: &Points,
     chosen: &Chosen,
     alignment: &Alignment,
-    lattice: &Lattice,
     symmetry: Option<&Symmetry>,
 ) -> Embedding {
     let mut placed: Vec<Option<Placed>> = (0..template.len()).map(|_| None).collect();
@@ -95,7 +91,6 @@ pub(super) fn expand(
         (embedding.heads[j], embedding.tails[j]) = (head.as_vec3().to_array(), tail.as_vec3().to_array());
         embedding.confidence[j] = confidence;
     }
-    draw_in(&mut embedding, lattice);
     if let Some(symmetry) = symmetry {
         mirror(&mut embedding, symmetry);
     }
@@ -146,38 +141,10 @@ fn frame_of(
             let (frame, confidence) = frame_of(parent, template, placed, frames, all);
             (frame, HANGING * confidence)
         }
-        (None, None) => match nearest_placed(template.head(j), template, placed) {
-            // The feet of some rigs, which hang on nothing.
-            Some(near) => {
-                let (frame, confidence) = frame_of(near, template, placed, frames, all);
-                (frame, HANGING * confidence)
-            }
-            None => (all, HANGING),
-        },
+        (None, None) => (all, HANGING),
     };
     frames[j] = Some(found);
     found
-}
-
-fn nearest_placed(point: DVec3, template: &Template<'_>, placed: &[Option<Placed>]) -> Option<usize> {
-    let apart = |j: usize| template.head(j).distance(point).min(template.tail(j).distance(point));
-    let all = (0..template.len()).filter(|&j| placed[j].is_some()).map(|j| (j, apart(j)));
-    all.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(j, _)| j)
-}
-
-/// Moves heads that are outside, but not far, to the nearest place inside, and tails that met them along.
-fn draw_in(embedding: &mut Embedding, lattice: &Lattice) {
-    let reach = DRAWN_IN * lattice.cells().size();
-    for j in 0..embedding.heads.len() {
-        let before = embedding.heads[j];
-        let point = glam::Vec3::from(before).as_dvec3();
-        let inside = lattice.middle(lattice.nearest_node(point));
-        if lattice.node_at(point).is_none() && inside.distance(point) < reach {
-            let after = inside.as_vec3().to_array();
-            embedding.heads[j] = after;
-            embedding.tails.iter_mut().filter(|tail| **tail == before).for_each(|tail| *tail = after);
-        }
-    }
 }
 
 /// Bones whose images were placed are their images; bones on the plane stay on it.

@@ -26,7 +26,7 @@ use crate::progress::Progress;
 
 use places::Places;
 use reduced::Reduced;
-use symmetry::{Images, Symmetry};
+use symmetry::Symmetry;
 
 /// Cells along the diameter of the mesh.
 const RESOLUTION: f64 = 96.0;
@@ -59,18 +59,17 @@ fn middle(points: impl Iterator<Item = DVec3>) -> DVec3 {
 
 pub(super) fn embed(mesh: &TriMesh<'_>, template: &Template<'_>, progress: &Progress) -> Result<Embedding> {
     let start = Instant::now();
-    let images = Images::new(template);
-    let reduced = Reduced::new(template, images.as_ref())?;
+    let reduced = Reduced::new(template)?;
     let lattice = Lattice::new(mesh, RESOLUTION, progress)?;
     progress.report(0.3);
-    let symmetry = images.and_then(|images| Symmetry::new(images, &reduced, mesh, &lattice));
+    let symmetry = Symmetry::new(template, &reduced, mesh, &lattice);
     let places = Places::new(mesh, &lattice, symmetry.as_ref(), progress)?;
     progress.report(0.7);
     let alignment = Alignment::new(mesh, &reduced, places.diameter());
     let chosen = discrete::choose(&reduced, &places, &alignment, symmetry.as_ref(), progress)?;
     progress.report(0.9);
     let points = ways::place(&lattice, &places, &reduced, &chosen, symmetry.as_ref());
-    let mut embedding = expand::expand(template, &reduced, &points, &chosen, &alignment, &lattice, symmetry.as_ref());
+    let mut embedding = expand::expand(template, &reduced, &points, &chosen, &alignment, symmetry.as_ref());
     embedding.report = Report {
         places: places.len(),
         main_joints: reduced.joints.len(),

@@ -3,11 +3,10 @@
 use glam::DVec3;
 
 use super::super::Template;
-use super::symmetry::Images;
 use crate::error::{Error, Result};
 
 /// A branch counts if it is at least this share of the longest way down from the root.
-const LEAST_BRANCH: f64 = 0.15;
+const LEAST_BRANCH: f64 = 0.2;
 
 /// A branch or an extremity.
 #[derive(Debug, Clone)]
@@ -44,18 +43,17 @@ struct Tree<'a> {
     template: &'a Template<'a>,
     children: Vec<Vec<usize>>,
     longest: Vec<f64>,
-    images: Option<&'a Images>,
 }
 
 impl<'a> Tree<'a> {
-    fn new(template: &'a Template<'a>, images: Option<&'a Images>) -> Self {
+    fn new(template: &'a Template<'a>) -> Self {
         let mut children = vec![Vec::new(); template.len()];
         for j in 0..template.len() {
             if let Some(parent) = template.parent(j) {
                 children[parent].push(j);
             }
         }
-        let mut tree = Self { template, children, longest: vec![0.0; template.len()], images };
+        let mut tree = Self { template, children, longest: vec![0.0; template.len()] };
         let mut order: Vec<usize> = (0..template.len()).filter(|&j| template.parent(j).is_none()).collect();
         let mut k = 0;
         while k < order.len() {
@@ -81,10 +79,7 @@ impl<'a> Tree<'a> {
     /// The child that the longest way from `j` goes through, or none if it ends at the tail of `j`.
     fn deepest(&self, j: usize) -> Option<usize> {
         let own = self.template.head(j).distance(self.template.tail(j));
-        // A head does not end at one of its ears.
-        let may_follow = |&c: &usize| self.images.is_none_or(|images| !images.is_on_plane(j) || images.is_on_plane(c));
-        let children = self.children[j].iter().copied().filter(may_follow);
-        let deepest = children.max_by(|&a, &b| self.below(j, a).total_cmp(&self.below(j, b)));
+        let deepest = self.children[j].iter().copied().max_by(|&a, &b| self.below(j, a).total_cmp(&self.below(j, b)));
         deepest.filter(|&c| self.below(j, c) > own)
     }
 }
@@ -92,8 +87,8 @@ impl<'a> Tree<'a> {
 impl Reduced {
     /// # Errors
     /// [`Error::InvalidSkeleton`] if the template has no extent.
-    pub(super) fn new(template: &Template<'_>, images: Option<&Images>) -> Result<Self> {
-        let tree = Tree::new(template, images);
+    pub(super) fn new(template: &Template<'_>) -> Result<Self> {
+        let tree = Tree::new(template);
         let roots = (0..template.len()).filter(|&j| template.parent(j).is_none());
         let top = roots.max_by(|&a, &b| tree.longest[a].total_cmp(&tree.longest[b])).expect("parents end somewhere");
         if tree.longest[top] == 0.0 {

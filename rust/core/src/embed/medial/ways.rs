@@ -95,9 +95,9 @@ fn way(lattice: &Lattice, places: &Places, from: usize, to: usize) -> Vec<u32> {
     nodes
 }
 
-fn smooth(points: &mut Vec<DVec3>) {
+fn smooth(points: &mut [DVec3]) {
     for _ in 0..SMOOTHING {
-        let before = points.clone();
+        let before = points.to_vec();
         for k in 1..points.len().saturating_sub(1) {
             points[k] = 0.25 * before[k - 1] + 0.5 * before[k] + 0.25 * before[k + 1];
         }
