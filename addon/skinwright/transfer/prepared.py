@@ -59,6 +59,11 @@ class Prepared:
         mask = thresholds.pop("mask", None)
         return self._own(self._inpainting.matched(mask=self._spread([mask]), **self._settings | thresholds))
 
+    def confidence(self, **thresholds: Any) -> NDArray[np.float32]:
+        """(V,) how far each vertex's row from the source is trusted, 0 to 1; otherwise as `matched`."""
+        mask = thresholds.pop("mask", None)
+        return self._own(self._inpainting.confidence(mask=self._spread([mask]), **self._settings | thresholds))
+
     def start(
         self, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, max_influences: int
     ) -> native.Job:
