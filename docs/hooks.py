@@ -9,6 +9,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = ROOT / "addon" / "skinwright"
 STUB = ROOT / "rust" / "native" / "skinwright_native.pyi"
+# What the artist calls features whose folders have another name.
+TITLES = {"autoskin": "Automatic Weights", "desparsify": "Add Bone Slots", "embed": "Embed Armature"}
+# Parts of expressions that say nothing to a reader.
+NAMELESS = {"name", "self", "obj", "data", "join", "len", "str", "r", "f", "s"}
 
 
 def on_page_markdown(markdown: str, page, config, files) -> str:
@@ -70,9 +74,14 @@ def plain(node: ast.expr) -> str:
     if isinstance(node, ast.JoinedStr):
         return "".join(plain(value) for value in node.values)
     if isinstance(node, ast.FormattedValue):
-        words = re.findall(r"[a-z_]+", ast.unparse(node.value).lower())
-        return f"*{words[0].replace('_', ' ') if words else 'value'}*"
+        return f"*{word(node.value)}*"
     return ""
+
+
+def word(node: ast.expr) -> str:
+    """What stands for a value in a message: the last name of its expression that says something."""
+    names = [name for name in re.findall(r"[a-z_]+", ast.unparse(node).lower()) if name not in NAMELESS]
+    return names[-1].replace("_", " ").strip() if names else "name"
 
 
 def settings() -> str:
@@ -81,7 +90,7 @@ def settings() -> str:
     for path in sorted(ADDON.glob("*/params.py")):
         rows = declarations(path)
         if rows:
-            heading = f"## {path.parent.name.title()}"
+            heading = f"## {TITLES.get(path.parent.name, path.parent.name.title())}"
             lines += [heading, "", "| setting | name in scripts | default | range | what it does |"]
             lines += ["| --- | --- | --- | --- | --- |", *rows, ""]
     return "\n".join(lines)
@@ -89,21 +98,48 @@ def settings() -> str:
 
 def declarations(path: Path) -> list[str]:
     """A table row per setting that a file declares."""
-    rows = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        call = node.value if isinstance(node, ast.AnnAssign) else None
-        if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "setting" and len(call.args) > 2:
+    rows, tree = [], ast.parse(path.read_text(encoding="utf-8"))
+    lists = {node.target.id: node.value for node in tree.body if isinstance(node, ast.AnnAssign)}
+    for node in ast.walk(tree):
+        call = declaration(node.value) if isinstance(node, ast.AnnAssign) else None
+        if call:
             default, label, sentence = call.args[:3]
             given = {keyword.arg: keyword.value for keyword in call.keywords}
+            if isinstance(given.get("choices"), ast.Name):
+                given["choices"] = lists.get(given["choices"].id)
             cells = [plain(label), f"`{node.target.id}`", shown(default), allowed(given), plain(sentence)]
             rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return rows
 
 
+def declaration(value: ast.expr | None) -> ast.Call | None:
+    """The call of `setting` that a field's value is, or that the function of declared.py makes which it calls."""
+    name = getattr(value.func, "id", "") if isinstance(value, ast.Call) else ""
+    if name == "setting" and len(value.args) > 2:
+        return value
+    tree = ast.parse((ADDON / "declared.py").read_text(encoding="utf-8"))
+    made = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name != "setting"]
+    if not made or not isinstance(made[0].body[-1], ast.Return):
+        return None
+    local = {node.targets[0].id: node.value for node in made[0].body if isinstance(node, ast.Assign)}
+    call = made[0].body[-1].value
+    if not (isinstance(call, ast.Call) and getattr(call.func, "id", "") == "setting"):
+        return None
+    return ast.Call(call.func, [local.get(getattr(arg, "id", ""), arg) for arg in call.args], call.keywords)
+
+
 def shown(default: ast.expr) -> str:
     """A default as a person reads it."""
     text = ast.unparse(default)
-    return "" if text == "MISSING" else f"{text[13:-1]}°" if text.startswith("math.radians(") else text.strip("'")
+    return "" if text == "MISSING" else in_degrees(text).strip("'")
+
+
+def in_degrees(text: str) -> str:
+    """An angle of the source as degrees; any other text as it is."""
+    if text.startswith("math.radians("):
+        return f"{text[13:-1]}°"
+    parts = re.fullmatch(r"math\.pi(?: / (\d+))?", text)
+    return f"{180 // int(parts[1] or 1)}°" if parts else text
 
 
 def allowed(given: dict[str, ast.expr]) -> str:
@@ -112,4 +148,5 @@ def allowed(given: dict[str, ast.expr]) -> str:
     if isinstance(choices, ast.Dict):
         return ", ".join(f"`{ast.literal_eval(key)}`" for key in choices.keys if isinstance(key, ast.Constant))
     ends = [ast.unparse(given[name]) if name in given else "" for name in ("least", "most")]
-    return f"{ends[0] or '0'} to {ends[1]}" if ends[1] else ""
+    least, most = (in_degrees(end) for end in ends)
+    return f"{least or '0'} to {most}" if most else f"from {least}" if least else ""

@@ -128,7 +128,7 @@ def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:
-    """(B, 4, 4) where each bone takes a point of the mesh, in the mesh' own space (spec-sculpt, section 7).
+    """(B, 4, 4) where each bone takes a point of the mesh, in the mesh's own space.
 
     object_world^-1 armature_world pose rest^-1 armature_world^-1 object_world
     """

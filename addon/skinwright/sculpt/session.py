@@ -1,7 +1,7 @@
 """Sculpt to weights: begin, stroke, undo, redo, commit, cancel. No event, no window.
 
 The artist sculpts the posed mesh with Blender's own brushes, which move rest positions. `stroke` puts them back and
-changes the weights of these vertices such that the pose shows what was sculpted (spec-sculpt). The object is found by
+changes the weights of these vertices such that the pose shows what was sculpted. The object is found by
 name each time, as Blender's undo replaces it.
 """
 
