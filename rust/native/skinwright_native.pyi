@@ -66,7 +66,7 @@ class Transfer:
     def report(self) -> dict[str, Any]: ...
 
 class TransferSettings(TypedDict, total=False):
-    """The settings of a transfer; `transfer_weights` shows the defaults (spec-transfer, sections 1 to 3).
+    """The settings of a transfer; `transfer_weights` shows the defaults (Abdrashitov et al. 2023).
 
     `method`: "paper" copies the closest point's weights where distance and angle are within their thresholds and
     ignores them elsewhere; "confidence" takes the point nearest in position and direction and trusts it over

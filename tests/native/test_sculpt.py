@@ -79,7 +79,7 @@ def test_the_solver_agrees_with_quadprog_on_other_sizes(n):
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 10.0, 100.0])
 def test_no_vertex_ends_farther_whatever_the_scale_unlike_in_the_thesis(scale):
-    """Each vertex has bones of its own that only shift it, so that d is any point (spec-sculpt, section 2)."""
+    """Each vertex has bones of its own that only shift it, so that d is any point."""
     rng = np.random.default_rng(3)
     count = 2000
     d = scale * rng.normal(size=(count, 3, 4))

@@ -23,7 +23,7 @@ def chain(name: str = "Rig") -> bpy.types.Object:
 
 
 def pose_from_rest(obj: bpy.types.Object, rig: bpy.types.Object) -> np.ndarray:
-    """(B, 4, 4) in the mesh' space: world^-1 rig pose rest^-1 rig^-1 world (spec-sculpt, section 7)."""
+    """(B, 4, 4) in the mesh's space: world^-1 rig pose rest^-1 rig^-1 world."""
     to_rig = rig.matrix_world.inverted() @ obj.matrix_world
     moved = [rig.pose.bones[bone].matrix @ rig.data.bones[bone].matrix_local.inverted() for bone in BONES]
     return np.array([to_rig.inverted() @ m @ to_rig for m in moved])

@@ -72,7 +72,7 @@ def match(source: tuple, target: tuple) -> Matching:
 
 def ties(source: tuple, point: np.ndarray, normal: np.ndarray) -> Matching:
     """What every source triangle gives that is as near to `point` as the nearest one, within 1e-12 of the squared
-    diagonal (spec-transfer, section 1: a tie may take any of them)."""
+    diagonal; a tie may take any of them."""
     positions, left, weights = source
     tolerance = 1e-12 * (np.ptp(positions, axis=0) ** 2).sum()
     shares, distances = [], []

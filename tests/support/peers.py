@@ -1,6 +1,6 @@
 """The peers, from public libraries: the pipeline of the paper's authors on libigl, CHOLMOD, SuperLU.
 
-The algorithm is Abdrashitov et al. 2023, with the energy of our own specification (S + l^2 S M^-1 S) so that the
+The algorithm is Abdrashitov et al. 2023, with our energy (S + l^2 S M^-1 S) so that the
 answers can be compared. Two things are faster here than in the authors' code, in the peers' favour: the normal test
 and the search for the vertices to smooth are vectorised.
 """

@@ -1,5 +1,6 @@
 //! Gives every vertex the same number of candidate bones, the new ones at weight zero, so that a later solve has
-//! room to move (thesis 6.3). What the thesis' own selection gets wrong is in the project's specification.
+//! room to move (Rubino 2020, section 6.3; cited in [`crate::sculpt`]). The thesis's own selection keeps the first
+//! bones by index where it should keep the largest.
 
 mod hop;
 mod surface;

@@ -1,4 +1,4 @@
-//! Candidates by distance along the surface: the thesis' mesh infection (7.5.2) made exact and finite.
+//! Candidates by distance along the surface: the thesis's mesh infection (7.5.2) made exact and finite.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,5 +1,8 @@
 //! Sculpt to weights: the displacement an artist sculpts on a posed character becomes skin weights.
 //!
+//! After G. Rubino, *A Blender plug-in for the interactive optimization of skinning in skeletal animation*, Universita
+//! degli Studi di Milano, 2020 (supervisor M. Tarini), called the thesis here.
+//!
 //! Each vertex is its own convex problem (thesis 6.4 with the bounds made exact and any number of poses):
 //! min over w of  sum_p alpha_p |sum_j w_j d_jp - t_p|^2 + k^2 |w - o|^2,  w >= 0, sum w = 1,
 //! with d_jp the rest position moved by bone j in pose p, t_p the sculpted position and o the weights before.

@@ -26,7 +26,7 @@ impl Length {
     }
 }
 
-/// Everything the artist can set. The default is the specification's.
+/// Everything the artist can set. The defaults suit garments on a person, in any unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// How matching points are found. Default [`MatchMethod::ClosestPoint`].

@@ -98,7 +98,7 @@ pub fn skirt() -> Fixture {
     tube(30, 40).mapped(flare).named("skirt")
 }
 
-/// Targets with everything that real files contain (spec-transfer, section 5, degenerate list).
+/// Targets with everything that real files contain.
 pub fn degenerate() -> Vec<Fixture> {
     let mut list = vec![body().0.named("target is the source"), skirt()];
     for scale in [0.01, 1.0, 100.0] {
