@@ -62,7 +62,7 @@ def _accessor(scene: dict, binary: bytes, index: int) -> np.ndarray:
         np.frombuffer(binary, np.uint8)[start:], (accessor["count"], columns * dtype.itemsize), (stride, 1)
     )
     values = rows.copy().view(dtype).reshape(accessor["count"], columns)
-    return values / np.iinfo(dtype).max if accessor.get("normalized") else values
+    return values / np.iinfo(dtype.name).max if accessor.get("normalized") else values
 
 
 def _mesh(scene: dict, accessor, node: dict) -> SkinnedMesh:
