@@ -99,6 +99,7 @@ class File:
 def welded(mesh: Mesh) -> Mesh:
     """Without the copies of vertices at seams; of several copies the first one's weights stay."""
     keys = np.round(mesh.positions / TOLERANCE).astype(np.int64)
+    first: np.ndarray
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)
     triangles = np.searchsorted(kept, first)[inverse.ravel()][mesh.triangles]
