@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import Literal
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
@@ -23,10 +24,13 @@ import rigged
 import skinwright_native as native
 from rigged import Rigged
 
-METHODS = ("heat", "geodesic", "euclidean")
+Method = Literal["heat", "geodesic", "euclidean"]
+Turns = dict[tuple[str, ...], tuple[tuple[float, float, float], float]]
+
+METHODS: tuple[Method, ...] = ("heat", "geodesic", "euclidean")
 
 # Turns of the bones named so: axis (right-handed, the character faces +Z and its left is +X) and degrees.
-POSES = {
+POSES: dict[str, Turns] = {
     "arms up": {("upperarm_l", "UpperArm.L"): ((0, 0, 1), 60), ("upperarm_r", "UpperArm.R"): ((0, 0, -1), 60)},
     "arms forward": {("upperarm_l", "UpperArm.L"): ((0, -1, 0), 70), ("upperarm_r", "UpperArm.R"): ((0, 1, 0), 70)},
     "elbows": {("lowerarm_l", "LowerArm.L"): ((0, -1, 0), 100), ("lowerarm_r", "LowerArm.R"): ((0, 1, 0), 100)},
@@ -50,7 +54,7 @@ def rotation(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def pose_of(body: Rigged, turns: dict) -> np.ndarray:
+def pose_of(body: Rigged, turns: Turns) -> np.ndarray:
     """pose_from_rest (B, 4, 4): every named bone turned about its head, children along with it."""
     found = {}
     for names, turn in turns.items():
@@ -84,7 +88,7 @@ def limited(weights: np.ndarray, influences: int = 4) -> np.ndarray:
     return weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
 
 
-def ours(body: Rigged, method: str) -> np.ndarray:
+def ours(body: Rigged, method: Method) -> np.ndarray:
     result = native.automatic_weights(body.positions, body.triangles, body.segments, body.parents, method=method)
     return result.weights.to_dense().astype(float)
 
@@ -172,10 +176,11 @@ def main() -> None:
     lines = ["# Automatic weights against artists' weights", "", __doc__.split("\n\n")[2].replace("\n", " "), ""]
     lines += ["| body | method | error | wrong | deformation | unweighted | seconds |", "|---|---|---|---|---|---|---|"]
     table: dict[str, list[tuple[Rigged, dict[str, float]]]] = {}
-    worst = []
+    worst: list[tuple[float, int, tuple[Rigged, str, np.ndarray, np.ndarray]]] = []
+    methods: tuple[Method | Literal["Blender"], ...] = (*METHODS, "Blender")
     for body in rigged.bodies(arguments.body):
         found = {}
-        for method in (*METHODS, "Blender"):
+        for method in methods:
             start = time.perf_counter()
             found[method] = blenders(body) if method == "Blender" else ours(body, method)
             seconds = time.perf_counter() - start
@@ -196,7 +201,7 @@ def main() -> None:
                 )
     lines += ["", "| mean of | method | error | wrong | deformation |", "|---|---|---|---|---|"]
     for kind in (False, True):
-        for method, rows in table.items():
+        for label, rows in table.items():
             chosen = [row for body, row in rows if body.is_animal == kind]
             if chosen:
                 error, wrong, away = (
@@ -204,7 +209,7 @@ def main() -> None:
                 )
                 away_text = "" if np.isnan(away) else f"{away:.2f}"
                 cells = f"{error:.4f} | {100 * wrong:.1f} % | {away_text}"
-                lines.append(f"| {'animals' if kind else 'humans'} | {method} | {cells} |")
+                lines.append(f"| {'animals' if kind else 'humans'} | {label} | {cells} |")
                 print(lines[-1], flush=True)
     (arguments.out / "autoskin_results.md").write_text("\n".join(lines) + "\n")
     worst.sort(key=lambda case: -case[0])

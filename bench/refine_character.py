@@ -59,7 +59,7 @@ def _accessor(scene: dict, binary: bytes, index: int) -> np.ndarray:
     shape = (accessor["count"], columns * dtype.itemsize)
     rows = np.lib.stride_tricks.as_strided(np.frombuffer(binary, np.uint8)[start:], shape, (stride, 1))
     values = rows.copy().view(dtype).reshape(accessor["count"], columns)
-    return values / np.iinfo(dtype).max if accessor.get("normalized") else values
+    return values / np.iinfo(dtype.name).max if accessor.get("normalized") else values
 
 
 def _weights(accessor, attributes: dict, vertices: int, bones: int) -> np.ndarray:

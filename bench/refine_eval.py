@@ -139,9 +139,12 @@ def cylinder_table(lines: list[str], quick: bool) -> None:
                 blender.posed(pose, smooth=True),
             ]
             cells = [_figures(refiner, pose, x, volume(x, triangles) / rest - 1) for x in shown]
-            for solver, quality in [(refiner, "live"), (refiner, "bake"), *((r, "bake") for r in without.values())]:
+            solvers: list[tuple[native.Refiner, native.Quality]] = [(refiner, "live"), (refiner, "bake")]
+            solvers += [(other, "bake") for other in without.values()]
+            for solver, quality in solvers:
                 x = solver.solve(pose, quality=quality)
                 report = solver.report()
+                assert report is not None  # it has just solved
                 inverted = report["inverted_tetrahedra"] / max(report["active_tetrahedra"], 1)
                 cells.append(_figures(refiner, pose, x, volume(x, triangles) / rest - 1) + f" / {inverted:.2%}")
             lines.append(f"| {label}, {kind} {degrees} | " + " | ".join(cells) + " |")

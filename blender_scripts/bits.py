@@ -7,7 +7,9 @@ same bits; no sine of some system's library takes part.
 from __future__ import annotations
 
 import hashlib
+import io
 import sys
+from typing import cast
 
 import numpy as np
 import skinwright_native as skinwright
@@ -15,7 +17,7 @@ import skinwright_native as skinwright
 
 def main() -> None:
     """One line per result: name, digest."""
-    sys.stdout.reconfigure(encoding="utf-8", newline="\n")
+    cast(io.TextIOWrapper, sys.stdout).reconfigure(encoding="utf-8", newline="\n")
     for name, arrays in results():
         digest = hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays))
         print(name, digest.hexdigest())

@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import bpy
 
@@ -12,12 +12,30 @@ from . import native
 
 T = TypeVar("T")
 # Each job that is yielded is answered with its result.
-Jobs = Generator["native.Job | Step", Any, T]
+Jobs = Generator["Work", Any, T]
 
 # What the panel shows the progress of.
 running: "Runner | None" = None
 
 _QUIET_SECONDS = 1.0
+
+
+class Work(Protocol):
+    """What `Runner` waits for: native.Job, Step, or whatever else has these."""
+
+    @property
+    def progress(self) -> float:
+        """The share that is done."""
+
+    @property
+    def done(self) -> bool:
+        """Whether `result` returns at once."""
+
+    def cancel(self) -> None:
+        """Ask it to stop."""
+
+    def result(self) -> Any:
+        """The answer; waits for it."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +57,7 @@ class Runner:
 
     def __init__(self, steps: Jobs[Any]) -> None:
         self._steps = steps
-        self._job: native.Job | Step | None = None
+        self._job: Work | None = None
         self.done = False
         self.result: Any = None
         self._advance(lambda: next(steps))
@@ -68,7 +86,7 @@ class Runner:
         self._steps.close()
         self.done = True
 
-    def _answer(self, job: native.Job | Step) -> None:
+    def _answer(self, job: Work) -> None:
         try:
             answer = job.result()
         except native.NativeError as error:
@@ -77,7 +95,7 @@ class Runner:
             return
         self._advance(lambda: self._steps.send(answer))
 
-    def _advance(self, step: Callable[[], native.Job | Step]) -> None:
+    def _advance(self, step: Callable[[], Work]) -> None:
         try:
             self._job = step()
         except StopIteration as end:

@@ -11,6 +11,7 @@ from typing import Any
 
 import igl
 import numpy as np
+import scipy.sparse as sp
 
 from .characters import File, Mesh, Skeleton, joined, welded
 from .poses import Poses, skinned
@@ -39,13 +40,19 @@ class Body:
     joints: dict[str, np.ndarray]
     pose_from_rest: np.ndarray
 
+    @property
+    def skin(self) -> sp.csr_matrix:
+        """The weights, which every body has."""
+        assert self.mesh.weights is not None
+        return self.mesh.weights
+
     @cached_property
     def rest_surface(self) -> Surface:
         return Surface(self.mesh.positions, self.mesh.triangles)
 
     @cached_property
     def posed_surfaces(self) -> list[Surface]:
-        posed = skinned(self.mesh.positions, self.mesh.weights.toarray(), self.pose_from_rest)
+        posed = skinned(self.mesh.positions, self.skin.toarray(), self.pose_from_rest)
         return [Surface(positions, self.mesh.triangles) for positions in posed]
 
 
@@ -109,6 +116,7 @@ class Case:
 
     @cached_property
     def artist_posed(self) -> np.ndarray:
+        assert self.artist is not None  # asked only of garments that have a reference
         return skinned(self.mesh.positions, self.artist, self.body.pose_from_rest)
 
     @cached_property
@@ -170,6 +178,7 @@ def _garments(folder: Path, body: Body, entry: dict[str, Any]) -> list[Case]:
         one, artist = welded(mesh), None
         if entry["reference"] != "none":
             names = file.skeleton().names
+            assert one.weights is not None  # a reference is a garment with weights
             artist = one.weights[:, [names.index(name) for name in body.skeleton.names]].toarray()
             artist /= np.maximum(artist.sum(axis=1, keepdims=True), 1e-12)
         name = entry["id"] if len(meshes) == 1 else f"{entry['id']}:{mesh.name}"

@@ -72,7 +72,7 @@ class File:
         shape, strides = (entry["count"], size), (view.get("byteStride", size), 1)
         rows = np.lib.stride_tricks.as_strided(np.frombuffer(self.binary, np.uint8)[start:], shape, strides)
         values = rows.copy().view(dtype).reshape(entry["count"], columns)
-        return values / np.iinfo(dtype).max if entry.get("normalized") else values
+        return values / np.iinfo(dtype.name).max if entry.get("normalized") else values
 
     def _mesh(self, node: dict[str, Any]) -> Mesh:
         positions: list[np.ndarray] = []
@@ -99,6 +99,7 @@ class File:
 def welded(mesh: Mesh) -> Mesh:
     """Without the copies of vertices at seams; of several copies the first one's weights stay."""
     keys = np.round(mesh.positions / TOLERANCE).astype(np.int64)
+    first: np.ndarray
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)
     triangles = np.searchsorted(kept, first)[inverse.ravel()][mesh.triangles]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,11 +31,11 @@ def nearest(case: Case, mesh: Mesh) -> np.ndarray:
     return weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
 
 
-def transferred(method: str, **settings) -> Weighting:
+def transferred(method: native.MatchMethod, **settings) -> Weighting:
     """The native module's transfer."""
 
     def weigh(case: Case, mesh: Mesh) -> np.ndarray:
-        body = case.body.mesh.weights.tocsr()
+        body = case.body.skin.tocsr()
         body.sort_indices()
         weights = native.Weights(body.indptr, body.indices, body.data, body.shape[1])
         source = native.Source(case.body.mesh.positions, case.body.mesh.triangles, weights)
@@ -45,7 +46,9 @@ def transferred(method: str, **settings) -> Weighting:
 
 def methods() -> dict[str, Weighting]:
     """Nearest point first, then the module's methods in its order; a new one appears by itself."""
-    return {"nearest": nearest} | {name: transferred(name) for name in _names("MatchMethod")}
+    return {"nearest": nearest} | {
+        name: transferred(cast("native.MatchMethod", name)) for name in _names("MatchMethod")
+    }
 
 
 def _names(literal: str) -> list[str]:

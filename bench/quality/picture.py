@@ -28,7 +28,8 @@ def draw(cases: list[tuple[Case, dict[str, np.ndarray]]], pose_names: list[str],
     for row, (case, by_method) in zip(axes, cases, strict=True):
         last = list(by_method.values())[-1]
         pose = worst_pose(case, last)
-        body = skinned(case.body.mesh.positions, case.body.mesh.weights.toarray(), case.body.pose_from_rest[[pose]])[0]
+        body = skinned(case.body.mesh.positions, case.body.skin.toarray(), case.body.pose_from_rest[[pose]])[0]
+        assert case.artist is not None  # only such garments are drawn
         artist = case.artist_posed[pose]
         for axis, (name, weights) in zip(row, {"artist": case.artist, **by_method}.items(), strict=True):
             posed = skinned(case.mesh.positions, weights, case.body.pose_from_rest[[pose]])[0]

@@ -82,7 +82,9 @@ def skinned(positions: np.ndarray, weights: np.ndarray, pose_from_rest: np.ndarr
 
 
 def _parents_first(parents: list[int]) -> list[int]:
-    depth = lambda bone: 0 if bone < 0 else 1 + depth(parents[bone])  # noqa: E731
+    def depth(bone: int) -> int:
+        return 0 if bone < 0 else 1 + depth(parents[bone])
+
     return sorted(range(len(parents)), key=depth)
 
 

@@ -62,11 +62,15 @@ def _accessor(scene: dict, binary: bytes, index: int) -> np.ndarray:
         np.frombuffer(binary, np.uint8)[start:], (accessor["count"], columns * dtype.itemsize), (stride, 1)
     )
     values = rows.copy().view(dtype).reshape(accessor["count"], columns)
-    return values / np.iinfo(dtype).max if accessor.get("normalized") else values
+    return values / np.iinfo(dtype.name).max if accessor.get("normalized") else values
 
 
 def _mesh(scene: dict, accessor, node: dict) -> SkinnedMesh:
-    positions, triangles, joints, shares, start = [], [], [], [], 0
+    positions: list[np.ndarray] = []
+    triangles: list[np.ndarray] = []
+    joints: list[np.ndarray] = []
+    shares: list[np.ndarray] = []
+    start = 0
     for part in scene["meshes"][node["mesh"]]["primitives"]:
         attributes = part["attributes"]
         positions.append(accessor(attributes["POSITION"]))
@@ -76,17 +80,18 @@ def _mesh(scene: dict, accessor, node: dict) -> SkinnedMesh:
             joints.append(np.hstack([accessor(attributes[f"JOINTS_{k}"]) for k in sets]))
             shares.append(np.hstack([accessor(attributes[f"WEIGHTS_{k}"]) for k in sets]))
         start += len(positions[-1])
-    positions, triangles, weights = np.vstack(positions), np.vstack(triangles), None
+    weights = None
     if joints and "skin" in node:
-        joints, shares = np.vstack(joints), np.vstack(shares)
+        at_bones, values = np.vstack(joints), np.vstack(shares)
         bones = len(scene["skins"][node["skin"]]["joints"])
-        rows = np.repeat(np.arange(len(joints)), joints.shape[1])
-        weights = sp.csr_matrix((shares.ravel().astype(float), (rows, joints.ravel())), (len(positions), bones))
-    return _merge_equal_positions(node.get("name", ""), positions, triangles, weights)
+        rows = np.repeat(np.arange(len(at_bones)), at_bones.shape[1])
+        weights = sp.csr_matrix((values.ravel().astype(float), (rows, at_bones.ravel())), (start, bones))
+    return _merge_equal_positions(node.get("name", ""), np.vstack(positions), np.vstack(triangles), weights)
 
 
 def _merge_equal_positions(name, positions, triangles, weights) -> SkinnedMesh:
     """A file repeats a vertex for every normal or texture coordinate it has; the first one stays."""
+    first: np.ndarray
     _, first, inverse = np.unique(positions, axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)
     new = np.searchsorted(kept, first)[inverse.ravel()]

@@ -9,7 +9,7 @@ import bpy
 from .. import files, jobs, native
 from ..declared import declared, described, from_json
 from ..refine import cache, correctives
-from ..refine.params import CorrectiveParams
+from ..refine.params import CacheFormat, CorrectiveParams
 from ..scene import blend_file, mesh_cache
 from ..scene.error import SceneError
 
@@ -63,7 +63,7 @@ def _cache(options: argparse.Namespace, obj: bpy.types.Object, params: Correctiv
         raise SceneError("refine cache needs --cache, a .pc2 or an .mdd")
     scene = bpy.context.scene
     first, last = options.frames or (scene.frame_start, scene.frame_end)
-    kind = "mdd" if options.cache.suffix.lower() == ".mdd" else "pc2"
+    kind: CacheFormat = "mdd" if options.cache.suffix.lower() == ".mdd" else "pc2"
     path = options.cache.resolve()
     return jobs.wait(cache.steps(obj, params, path, (first, last), kind, overwrite=options.overwrite))
 

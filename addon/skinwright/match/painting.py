@@ -52,6 +52,7 @@ class MaskPainting:
     def open(self, context: bpy.types.Context) -> None:
         """Show the match, and make the mask the group that is painted."""
         target = self.session.target()
+        assert target is not None  # the session has just been made for it
         group = mask.ensure(target)
         target.vertex_groups.active = target.vertex_groups[group]
         context.scene.skinwright.overlay.kind = "MATCH"

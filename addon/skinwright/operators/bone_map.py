@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import StringProperty
@@ -47,6 +48,8 @@ class SKINWRIGHT_OT_bone_map_save(ExportHelper, SkinwrightOperator):
     bl_description = "Save the bone map as a JSON file, to be used for other characters with the same rigs"
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"}, name="Filter", description="Files shown")
+    if TYPE_CHECKING:
+        filepath: str  # the base's property
 
     @classmethod
     def refusal(cls, context: Context) -> str:
@@ -76,6 +79,8 @@ class SKINWRIGHT_OT_bone_map_load(ImportHelper, SkinwrightOperator):
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"}, name="Filter", description="Files shown")
+    if TYPE_CHECKING:
+        filepath: str  # the base's property
 
     @classmethod
     def refusal(cls, context: Context) -> str:

@@ -59,7 +59,8 @@ def steps(
     character = characters.read(obj)
     matrices = list(_poses(obj, character, range(first, last + 1)))
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
-    solved = yield Solving([lambda pose=pose: refiner.solve(pose, quality="bake") for pose in matrices])
+    tasks = [lambda pose=pose: refiner.solve(pose, quality="bake") for pose in matrices]
+    solved = yield Solving(tasks)
     positions = np.stack(solved)
     if not np.isfinite(positions).all():
         raise SceneError(f"{obj.name}: a refined frame is not finite; nothing was written")

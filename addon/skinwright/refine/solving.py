@@ -9,7 +9,8 @@ class Solving:
     """Does tasks one after the other, as `jobs.Runner` expects a job: the native module frees the interpreter."""
 
     def __init__(self, tasks: Sequence[Callable[[], Any]]) -> None:
-        self._tasks, self._results = tasks, []
+        self._tasks = tasks
+        self._results: list[Any] = []
         self._error: Exception | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._work, daemon=True)

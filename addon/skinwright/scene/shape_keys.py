@@ -32,6 +32,6 @@ def mixed(obj: bpy.types.Object, basis: NDArray[np.float32] | None = None) -> ND
     return mix.astype(np.float32)
 
 
-def _influence(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> NDArray[np.float64] | float:
+def _influence(obj: bpy.types.Object, key: bpy.types.ShapeKey) -> NDArray[np.float32] | float:
     """(V, 1) how far the key's vertex group lets it act."""
     return vertex_groups.values(obj, key.vertex_group)[:, None] if key.vertex_group in obj.vertex_groups else 1.0

@@ -145,7 +145,7 @@ class SculptSession:
 
     def problem(self, obj: bpy.types.Object) -> str:
         """Why no stroke can become weights any more, or nothing. Bones that were renamed are followed."""
-        rig = self.rig.find()
+        rig = self._found_rig()
         bones = [bone.name for bone in rig.data.bones]
         if bones == self._bones:
             return ""
@@ -227,7 +227,7 @@ class SculptSession:
             self._guard_joints(obj, vertices)
         del self._reached[self.stroke_count :]
         reachability = self._reach(obj, vertices, targets)
-        other = self._reach_mirrored(vertices, targets) if self._mirror else vertices[:0]
+        other = self._reach_mirrored(self._mirror, vertices, targets) if self._mirror else vertices[:0]
         self._reached.append(reachability)
         self._steps.append(1 + bool(other.size))
         self._taken_back.clear()
@@ -235,11 +235,11 @@ class SculptSession:
         vertex_groups.write(obj, self.names, self._present(touched), touched)
         return Outcome(len(touched), reachability)
 
-    def _reach_mirrored(self, vertices: NDArray, targets: NDArray) -> NDArray:
+    def _reach_mirrored(self, mirror: Mirror, vertices: NDArray, targets: NDArray) -> NDArray:
         """The same on the other side, in the pose that is this one's mirror image; gives the vertices there."""
-        other, mirrored = self._mirror.of_stroke(vertices, targets)
+        other, mirrored = mirror.of_stroke(vertices, targets)
         if other.size:
-            self._solver.add_pose(self._mirror.of_pose(self._matrices))
+            self._solver.add_pose(mirror.of_pose(self._matrices))
             self._solver.stroke(other, mirrored)
             self._solver.add_pose(self._matrices)
         return other
@@ -288,7 +288,11 @@ class SculptSession:
         if not taken:
             return False
         given.append(taken.pop())
-        touched = [step() for _ in range(given[-1])]
+        touched: list[NDArray] = []
+        for _ in range(given[-1]):
+            stepped = step()
+            assert stepped is not None  # the solver has as many strokes as the lists count
+            touched.append(stepped)
         vertices = np.unique(np.concatenate(touched)).astype(np.uint32)
         vertex_groups.write(self._found(), self.names, self._present(vertices), vertices)
         return True
@@ -375,12 +379,18 @@ class SculptSession:
             raise SceneError(f"{self.target_name} or {self.rig.name} is gone: undo what removed it")
         return obj
 
+    def _found_rig(self) -> bpy.types.Object:
+        """Where `target` has just found the object, and so its armature."""
+        rig = self.rig.find()
+        assert rig is not None
+        return rig
+
     def _correct(self, obj: bpy.types.Object, pose: int, warnings: list[str]) -> list[str]:
         """A shape key for what is left in a pose."""
         vertices, offsets = self._solver.rest_residuals(pose)
         if not offsets.any():
             return []
-        rig, rotations = self.rig.find(), self._rotations[pose]
+        rig, rotations = self._found_rig(), self._rotations[pose]
         rows = self._present(vertices)
         share = dict(zip(self.names, np.bincount(rows.bones, rows.values, len(self.names)).tolist(), strict=True))
         bone = corrective.joint(rig, share, rotations)

@@ -47,7 +47,9 @@ class SKINWRIGHT_OT_end_match_mask(Operator):
 
     def execute(self, _context: Context) -> set[str]:
         """The painting operator ends itself."""
-        brush_session.current.asked = "KEEP" if self.keep else "CANCEL"
+        session = brush_session.current
+        assert session is not None  # `poll` has seen it
+        session.asked = "KEEP" if self.keep else "CANCEL"
         return {"FINISHED"}
 
 

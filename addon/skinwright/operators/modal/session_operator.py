@@ -1,7 +1,7 @@
 """Base of the operators that run beside Blender's brushes. No exception leaves them or leaves a session behind."""
 
 import bpy
-from bpy.types import Context, Event, Operator
+from bpy.types import Context, Event, Object, Operator
 
 from ...errors import Refused, internal
 from ...scene import changes
@@ -77,7 +77,7 @@ class SessionOperator(Operator):
         obj = session.target()
         if obj is None:
             return self._end(context, Ending.ASIDE, f"{session.object.name} is gone: {session.label} has ended")
-        if self._blender_stepped(context):
+        if self._blender_stepped(context, obj):
             return self._end(context, Ending.UNDONE, f"Undo has gone back to before {session.label}, which has ended")
         why = _aside(context, session) or session.problem(obj)
         if why:
@@ -106,13 +106,13 @@ class SessionOperator(Operator):
         asked = ("REDO" if event.shift else "UNDO") if undo else _KEYS.get(event.type, "")
         return "" if asked and held_input.is_elsewhere(context, event) else asked
 
-    def _blender_stepped(self, context: Context) -> bool:
+    def _blender_stepped(self, context: Context, obj: Object) -> bool:
         """Tell the session what Blender has undone or redone; whether that leads out of it."""
         undone, redone = changes.undone - self._undone, changes.redone - self._redone
         if not undone and not redone:
             return False
         self._undone, self._redone = changes.undone, changes.redone
-        session, obj = self._session, self._session.target()
+        session = self._session
         if not getattr(obj.skinwright, session.flag):
             return True
         brushing = self._mode == obj.mode == session.mode

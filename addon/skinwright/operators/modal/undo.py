@@ -6,8 +6,9 @@ goes on in the same direction until it is outside. So nothing else that the arti
 would be if the steps were taken back when the session ends.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 import bpy
 from bpy.app.handlers import persistent, redo_post, undo_post
@@ -20,6 +21,16 @@ _MOST_STEPS = 300
 
 _going_on = False
 _back = True
+
+
+class _Step(Protocol):
+    """bpy.ops.ed.undo or redo."""
+
+    def poll(self) -> bool:
+        """Whether it can run now."""
+
+    def __call__(self) -> set[str]:
+        """Run it."""
 
 
 @persistent
@@ -77,7 +88,7 @@ def _no_handlers() -> Iterator[None]:
         _going_on = False
 
 
-def _until_outside(step: Callable[[], set[str]]) -> bool:
+def _until_outside(step: _Step) -> bool:
     for _ in range(_MOST_STEPS):
         if not brush_session.flagged():
             return True

@@ -15,7 +15,7 @@ from ...scene.error import SceneError
 from ...settings.refine import RefineSettings, adopt
 from ..base import SkinwrightOperator
 from ..modal.long_work import LongWork
-from .targets import refusal, target
+from .targets import found, refusal
 
 
 class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOperator):
@@ -59,7 +59,7 @@ class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOpera
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> "jobs.Jobs[cache.CacheReport]":
-        obj, kind = target(context), self.kind.lower()
+        obj, kind = found(context), self.kind.lower()
         params = self.to_params(preferences.threads(context))
         return cache.steps(obj, params, self._path(obj.name, kind), (self.frame_start, self.frame_end), kind)
 
@@ -82,12 +82,12 @@ class SKINWRIGHT_OT_remove_refined_cache(SkinwrightOperator):
     @classmethod
     def refusal(cls, context: Context) -> str:
         """Only where there is one."""
-        found = refusal(context, "remove a cache")
-        return found or ("" if mesh_cache.NAME in target(context).modifiers else "This mesh plays no refined cache")
+        reason = refusal(context, "remove a cache")
+        return reason or ("" if mesh_cache.NAME in found(context).modifiers else "This mesh plays no refined cache")
 
     def work(self, context: Context) -> set[str]:
         """Remove the modifier."""
-        mesh_cache.remove(target(context))
+        mesh_cache.remove(found(context))
         return {"FINISHED"}
 
 

@@ -13,7 +13,7 @@ from ...registration import registration
 from ...settings.refine import CorrectiveSettings, adopt
 from ..base import SkinwrightOperator
 from ..modal.long_work import LongWork
-from .targets import chosen_joints, refusal, target
+from .targets import chosen_joints, found, refusal
 
 
 class SKINWRIGHT_OT_bake_correctives(LongWork, CorrectiveSettings, SkinwrightOperator):
@@ -52,7 +52,7 @@ class SKINWRIGHT_OT_bake_correctives(LongWork, CorrectiveSettings, SkinwrightOpe
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> "jobs.Jobs[correctives.CorrectiveReport]":
-        obj = target(context)
+        obj = found(context)
         params = self.to_params(preferences.threads(context))
         return correctives.steps(obj, params, chosen_joints(context, obj))
 
@@ -68,12 +68,12 @@ class SKINWRIGHT_OT_remove_correctives(SkinwrightOperator):
     @classmethod
     def refusal(cls, context: Context) -> str:
         """Only where there are some."""
-        found = refusal(context, "remove correctives")
-        return found or ("" if correctives.baked(target(context)) else "There are no baked correctives on this mesh")
+        reason = refusal(context, "remove correctives")
+        return reason or ("" if correctives.baked(found(context)) else "There are no baked correctives on this mesh")
 
     def work(self, context: Context) -> set[str]:
         """Remove and say how many."""
-        obj = target(context)
+        obj = found(context)
         return self.tell(f"{obj.name}: {correctives.remove(obj)} corrective keys removed", [])
 
 

@@ -10,7 +10,7 @@ from ...registration import registration
 from ...scene import armature
 from ...settings.refine import RefineSettings, adopt
 from ..base import SkinwrightOperator
-from .targets import refusal, target
+from .targets import found, refusal
 
 
 class SKINWRIGHT_OT_live_refine(RefineSettings, SkinwrightOperator):
@@ -32,7 +32,7 @@ class SKINWRIGHT_OT_live_refine(RefineSettings, SkinwrightOperator):
             live.stop()
             return self.tell("Live refinement is off", [])
         adopt(self, context.scene.skinwright.refine, RefineSettings)
-        obj = target(context)
+        obj = found(context)
         rig = armature.find(obj)
         others = [other for other in context.selected_objects if other.type == "MESH" and other != obj]
         garments = [other for other in others if armature.find(other) == rig]

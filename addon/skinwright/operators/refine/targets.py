@@ -18,6 +18,13 @@ def target(context: Context) -> Object | None:
     return chosen[0] if len(chosen) == 1 else None
 
 
+def found(context: Context) -> Object:
+    """The target, which `refusal` has seen."""
+    obj = target(context)
+    assert obj is not None
+    return obj
+
+
 def refusal(context: Context, purpose: str) -> str:
     """Why nothing can be refined now, or nothing; `purpose` ends the sentence."""
     if native.problem():

@@ -80,6 +80,7 @@ class SculptBrushes(BrushSession):
     def settle(self, context: Context) -> None:
         """A stroke may have ended just now."""
         obj = self.target()
+        assert obj is not None  # a session whose object is gone is not settled
         if obj.mode == self.mode and not self.changed_elsewhere(obj):
             self._look(context)
 

@@ -25,7 +25,9 @@ class SKINWRIGHT_OT_end_sculpt_weights(Operator):
 
     def execute(self, _context: Context) -> set[str]:
         """The sculpting operator ends itself."""
-        brush_session.current.asked = "KEEP" if self.keep else "CANCEL"
+        session = brush_session.current
+        assert session is not None  # `poll` has seen it
+        session.asked = "KEEP" if self.keep else "CANCEL"
         return {"FINISHED"}
 
 

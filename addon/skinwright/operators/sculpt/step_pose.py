@@ -27,6 +27,7 @@ class SKINWRIGHT_OT_step_pose(SkinwrightOperator):
     def work(self, context: Context) -> set[str]:
         """Around from the last to the first."""
         rig = _rig(context)
+        assert rig is not None  # `refusal` has seen it
         frames = poses.keyed_frames(rig)
         if not frames:
             raise SceneError(f"{rig.name} has no keyframes to step through: key the poses in an action")
