@@ -224,3 +224,27 @@ def key_offsets(obj, name):
         values.append(np.empty(3 * len(key.data), np.float32))
         key.data.foreach_get("co", values[-1])
     return (values[0] - values[1]).reshape(-1, 3)
+
+
+class TestForeignFiles:
+    """Baking costs nobody a file; baking again replaces what was baked."""
+
+    def test_a_certificate_replaces_a_certificate_only(self, tmp_path):
+        tube()
+        path = tmp_path / "certificate.json"
+        path.write_text("my notes")
+        with pytest.raises(RuntimeError, match="certificate.json exists and is not a report"):
+            bpy.ops.skinwright.bake_correctives(samples=1, filepath=str(path))
+        assert path.read_text() == "my notes" and bpy.data.objects["Limb"].data.shape_keys is None
+        path.unlink()
+        for _ in range(2):
+            bpy.ops.skinwright.bake_correctives(samples=1, filepath=str(path))
+        assert json.loads(path.read_text())
+
+    def test_a_cache_replaces_a_cache_only(self, tmp_path):
+        tube()
+        path = tmp_path / "scene.blend"
+        path.write_bytes(b"BLENDER")
+        with pytest.raises(RuntimeError, match=r"scene.blend exists already"):
+            bpy.ops.skinwright.bake_refined_cache(filepath=str(path), kind="PC2", frame_start=1, frame_end=2)
+        assert path.read_bytes() == b"BLENDER"

@@ -104,7 +104,13 @@ def test_the_bone_map_wins_and_can_be_edited(man, child, tmp_path):
     assert not rows[:, 2].any()
     assert np.abs(rows[:, 1] - truth(child[1][1], 2.0)[:, 1:].sum(1)).mean() < 0.05
     path = str(tmp_path / "map.json")
-    assert bpy.ops.skinwright.bone_map_save(filepath=path) == {"FINISHED"}
+    foreign = tmp_path / "notes.json"
+    foreign.write_text("{}")
+    with pytest.raises(RuntimeError, match="notes.json exists already"):
+        bpy.ops.skinwright.bone_map_save(filepath=str(foreign))
+    assert foreign.read_text() == "{}"
+    for _ in range(2):
+        assert bpy.ops.skinwright.bone_map_save(filepath=path) == {"FINISHED"}
     bpy.ops.skinwright.match_bones()
     assert settings.bone_map["Hand.L"].source == "Hand.L"
     assert bpy.ops.skinwright.bone_map_load(filepath=path) == {"FINISHED"}

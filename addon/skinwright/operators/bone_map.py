@@ -9,10 +9,11 @@ from bpy.props import StringProperty
 from bpy.types import Context, Event, Object
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
+from .. import files
 from ..errors import Refused
 from ..registration import registration
 from ..retarget import RetargetParams, match_bones, rest_bones_of
-from ..scene import armature
+from ..scene import armature, blend_file
 from ..settings.retarget import SKINWRIGHT_PG_retarget, pair_key
 from .base import SkinwrightOperator
 from .retarget_weights import refusal, targets
@@ -66,7 +67,9 @@ class SKINWRIGHT_OT_bone_map_save(ExportHelper, SkinwrightOperator):
         """Names only: it may be read for other characters."""
         entries = {entry.name: entry.source for entry in context.scene.skinwright.retarget.bone_map}
         text = json.dumps({"bone_map": entries}, indent=2, ensure_ascii=False)
-        Path(self.filepath).write_text(text + "\n", encoding="utf-8")
+        path = Path(self.filepath)
+        files.check_output(path, others=blend_file.opened(), overwrite=_is_bone_map(path))
+        files.write_whole(path, (text + "\n").encode())
         return {"FINISHED"}
 
 
@@ -135,6 +138,15 @@ def read_map(path: Path) -> dict[str, str]:
     if not isinstance(entries, dict) or not all(isinstance(name, str) for name in entries.values()):
         raise Refused(f"{path.name} holds no bone map: it must be an object with an object bone_map of names")
     return entries
+
+
+def _is_bone_map(path: Path) -> bool:
+    """Whether saving over this file loses nothing but another bone map."""
+    try:
+        read_map(path)
+    except Refused:
+        return False
+    return True
 
 
 def preset_folder() -> Path:

@@ -14,7 +14,14 @@ ROWS_OF_ACTIONS = (
     (("Invert", "INVERT"),),
     (("Mirror +X", "MIRROR_POSITIVE"), ("Mirror -X", "MIRROR_NEGATIVE")),
 )
-OVERLAYS = (("NONE", "None"), ("MATCH", "Match"), ("INFLUENCES", "Bone Count"), ("STRETCH", "Stretch"))
+OVERLAYS = (
+    ("NONE", "None"),
+    ("MATCH", "Match"),
+    ("INFLUENCES", "Bone Count"),
+    ("STRETCH", "Stretch"),
+    ("DIFFERENCE", "Difference"),
+    ("FAULTS", "Faults"),
+)
 
 
 class SKINWRIGHT_PT_match(Tab, Panel):

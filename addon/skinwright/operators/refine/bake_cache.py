@@ -6,11 +6,11 @@ import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import Context, Event
 
-from ... import jobs, preferences
+from ... import files, jobs, preferences
 from ...refine import cache
 from ...refine.params import FORMATS
 from ...registration import registration
-from ...scene import mesh_cache
+from ...scene import blend_file, mesh_cache
 from ...scene.error import SceneError
 from ...settings.refine import RefineSettings, adopt
 from ..base import SkinwrightOperator
@@ -61,7 +61,10 @@ class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOpera
     def _steps(self, context: Context) -> "jobs.Jobs[cache.CacheReport]":
         obj, kind = found(context), self.kind.lower()
         params = self.to_params(preferences.threads(context))
-        return cache.steps(obj, params, self._path(obj.name, kind), (self.frame_start, self.frame_end), kind)
+        path = self._path(obj.name, kind)
+        # Baking again replaces a cache, and nothing else.
+        files.check_output(path, others=blend_file.opened(), overwrite=path.suffix.lower() == f".{kind}")
+        return cache.steps(obj, params, path, (self.frame_start, self.frame_end), kind)
 
     def _path(self, name: str, kind: str) -> Path:
         if self.filepath:

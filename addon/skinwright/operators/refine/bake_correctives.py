@@ -1,15 +1,15 @@
 """Bake Correctives and Remove Correctives: refinement as driven shape keys, for engines and other packages."""
 
-import json
 from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
 from bpy.types import Context, Event
 
-from ... import jobs, preferences
+from ... import files, jobs, preferences
 from ...refine import correctives
 from ...registration import registration
+from ...scene import blend_file
 from ...settings.refine import CorrectiveSettings, adopt
 from ..base import SkinwrightOperator
 from ..modal.long_work import LongWork
@@ -48,13 +48,18 @@ class SKINWRIGHT_OT_bake_correctives(LongWork, CorrectiveSettings, SkinwrightOpe
     def complete(self, _context: Context, report: correctives.CorrectiveReport) -> set[str]:
         """Say what was done."""
         if self.filepath:
-            Path(bpy.path.abspath(self.filepath)).write_text(json.dumps(report.to_json(), indent=2) + "\n")
+            files.write_report(self._certificate(), report.to_json(), others=blend_file.opened())
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> "jobs.Jobs[correctives.CorrectiveReport]":
         obj = found(context)
         params = self.to_params(preferences.threads(context))
+        if self.filepath:
+            files.check_output(self._certificate(), others=blend_file.opened(), replaces=files.REPORT)
         return correctives.steps(obj, params, chosen_joints(context, obj))
+
+    def _certificate(self) -> Path:
+        return Path(bpy.path.abspath(self.filepath))
 
 
 class SKINWRIGHT_OT_remove_correctives(SkinwrightOperator):
