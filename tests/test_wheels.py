@@ -55,7 +55,7 @@ def module(wheel):
 
 
 def parsed(module):
-    binary = lief.parse(list(module))
+    binary = lief.parse(module)
     return binary.at(0) if isinstance(binary, lief.MachO.FatBinary) else binary
 
 
@@ -76,13 +76,15 @@ def test_what_is_published_with_it(wheel):
 
 
 def test_the_architecture(platform, module):
-    header = parsed(module).header
+    binary = parsed(module)
+    header = binary.header
     found = header.machine if platform.startswith("windows") else getattr(header, "machine_type", None)
     assert (header.cpu_type if platform.startswith("macos") else found) == ARCHITECTURE[platform]
 
 
 def test_the_entry_point_is_exported(platform, module):
-    exported = {symbol.name.removeprefix("_") for symbol in exported_symbols(platform, parsed(module))}
+    binary = parsed(module)  # lief's symbols do not keep it alive
+    exported = {symbol.name.removeprefix("_") for symbol in exported_symbols(platform, binary)}
     assert "PyInit_skinwright_native" in exported
 
 
@@ -92,7 +94,8 @@ def exported_symbols(platform, binary):
 
 def test_only_libraries_of_the_system(platform, module):
     allowed = {"linux": LINUX_LIBRARIES, "macos": MACOS_LIBRARIES, "windows": WINDOWS_LIBRARIES}[platform.split("-")[0]]
-    needed = [getattr(library, "name", library) for library in parsed(module).libraries]
+    binary = parsed(module)
+    needed = [getattr(library, "name", library) for library in binary.libraries]
     assert needed and not [name for name in needed if "skinwright" not in name and not allowed.fullmatch(name)]
 
 
