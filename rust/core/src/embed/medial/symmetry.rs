@@ -73,7 +73,10 @@ impl Symmetry {
             _ => Side::Negative,
         };
         let side: Vec<Side> = joints.iter().enumerate().map(side).collect();
-        if side.iter().all(|&side| side == Side::Plane) {
+        let start = |k: usize| reduced.joints[k].limb.as_ref().map(|limb| limb.from);
+        let hangs_alike = |k: usize| start(joint_image[k]) == start(k).map(|from| joint_image[from]);
+        let crosses = |k: usize| side[k] == Side::Positive && start(k).is_some_and(|from| side[from] == Side::Negative);
+        if side.iter().all(|&side| side == Side::Plane) || (0..joints.len()).any(|k| !hangs_alike(k) || crosses(k)) {
             return None;
         }
         let used = || mesh.triangles().as_flattened().iter().map(|&i| mesh.position(i)[axis]);
