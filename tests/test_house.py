@@ -19,7 +19,7 @@ FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "s
 FEATURES = {
     "transfer": set(),
     "match": {"transfer"},
-    "autoskin": set(),
+    "autoskin": {"transfer"},
     "desparsify": set(),
     "sculpt": {"desparsify"},
     "stored": {"transfer"},

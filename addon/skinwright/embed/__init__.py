@@ -62,6 +62,7 @@ def steps(
     context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: EmbedParams
 ) -> Jobs[EmbedReport]:
     """The same, job by job. Nothing is made before all is computed."""
+    source = _rig_of(source)
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
@@ -74,6 +75,14 @@ def steps(
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
     embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
     return _write(context, source, list(targets), bones, embedding, params)
+
+
+def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
+    """The armature that is meant: the object itself, or the one that deforms it."""
+    rig = source if source.type == "ARMATURE" else armature.find(source)
+    if rig is None:
+        raise SceneError(f"{source.name} is no armature and has none: pick the armature of another character")
+    return rig
 
 
 def _donor(
@@ -116,7 +125,7 @@ def _write(
     if params.bind:
         for obj in targets:
             if armature.find(obj) is None:
-                armature.attach(obj, rig)
+                armature.bind(obj, rig)
     outside = [bones.names[j] for j in embedding.report["outside"]]
     warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
     return EmbedReport(
