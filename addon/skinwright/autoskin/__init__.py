@@ -12,7 +12,7 @@ from .. import csr, jobs, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..reporting import AutoskinReport, SkinnedMesh
-from ..scene import armature, mesh, sculpting, vertex_groups, weight_state
+from ..scene import armature, mesh, object_state, sculpting, vertex_groups
 from ..scene.error import SceneError
 from .params import AutoskinParams
 
@@ -53,7 +53,7 @@ def steps(
         answers.append((yield from _compute(obj, its_rig, params)))
     if before_write:
         before_write(objects)
-    with weight_state.all_or_nothing(objects):
+    with object_state.all_or_nothing(objects):
         written = zip(objects, rigs, answers, strict=True)
         return AutoskinReport([_write(obj, its_rig, answer) for obj, its_rig, answer in written])
 
