@@ -54,7 +54,7 @@ class RetargetParams(Params):
         "Eigenpairs",
         "Eigenpairs of the Biharmonic method; more tell finer places apart",
         least=1,
-        most=1000,
+        most=2000,
         native=True,
     )
     smoothing_iterations: int = setting(

@@ -156,7 +156,8 @@ impl Refiner {
         let mut place = vec![None; self.prepared.surface.len()];
         solution.moved.iter().for_each(|&(vertex, at)| place[vertex as usize] = Some(self.prepared.in_mesh(at)));
         for (position, &welded) in positions.iter_mut().zip(&self.prepared.surface.of_vertex) {
-            if let Some(at) = place[welded as usize] {
+            // A pose that mirrors or flattens a joint may have no answer there: skinning has one.
+            if let Some(at) = place[welded as usize].filter(|at| at.is_finite()) {
                 *position = at.to_array();
             }
         }
@@ -183,7 +184,10 @@ impl Refiner {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
-            *position = places[welded as usize].to_array();
+            let at = places[welded as usize];
+            if at.is_finite() {
+                *position = at.to_array();
+            }
         }
     }
 

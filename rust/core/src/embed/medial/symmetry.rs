@@ -73,10 +73,7 @@ impl Symmetry {
             _ => Side::Negative,
         };
         let side: Vec<Side> = joints.iter().enumerate().map(side).collect();
-        let start = |k: usize| reduced.joints[k].limb.as_ref().map(|limb| limb.from);
-        let hangs_alike = |k: usize| start(joint_image[k]) == start(k).map(|from| joint_image[from]);
-        let crosses = |k: usize| side[k] == Side::Positive && start(k).is_some_and(|from| side[from] == Side::Negative);
-        if side.iter().all(|&side| side == Side::Plane) || (0..joints.len()).any(|k| !hangs_alike(k) || crosses(k)) {
+        if side.iter().all(|&side| side == Side::Plane) || !keeps_limbs(reduced, &joint_image, &side) {
             return None;
         }
         let used = || mesh.triangles().as_flattened().iter().map(|&i| mesh.position(i)[axis]);
@@ -125,6 +122,13 @@ impl Symmetry {
             _ => Side::Negative,
         }
     }
+}
+
+/// Whether limbs are mapped to limbs, and none crosses the plane: a chain along the axis is its own image, but turned about.
+fn keeps_limbs(reduced: &Reduced, image: &[usize], side: &[Side]) -> bool {
+    let from = |k: usize| reduced.joints[k].limb.as_ref().map(|limb| limb.from);
+    let crosses = |k: usize| side[k] == Side::Positive && from(k).is_some_and(|k| side[k] == Side::Negative);
+    (0..image.len()).all(|k| from(k).map(|from| image[from]) == from(image[k]) && !crosses(k))
 }
 
 fn nearest(points: &[DVec3], to: DVec3) -> Option<(usize, f64)> {
