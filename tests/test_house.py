@@ -39,6 +39,7 @@ MAY_IMPORT = {
     "native": {"csr", "errors", "memory"},
     "reporting": {"csr"},
     "soundness": {"csr", "errors"},
+    "translations": set(),
     "scene": {"csr", "errors", "soundness"},
     "jobs": {"csr", "errors", "native"},
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
@@ -48,7 +49,7 @@ MAY_IMPORT = {
     "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
     "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},
     "headless": FLOOR | set(FEATURES),
-    "__init__": {"headless", "operators", "overlay", "preferences", "settings", "scene", "ui"},
+    "__init__": {"headless", "operators", "overlay", "preferences", "settings", "scene", "translations", "ui"},
 }
 NEVER_SEES_BPY = {"csr", "declared", "errors", "files", "memory", "native", "reporting", "soundness"}
 MAY_SEE_THE_WHEEL = {"native"}
