@@ -48,14 +48,14 @@ def embed(obj, **settings):
     return next(m.object for m in obj.modifiers if m.type == "ARMATURE")
 
 
-@pytest.mark.parametrize("method", ["TEMPLATE", "MEDIAL"])
+@pytest.mark.parametrize("method, worst", [("TEMPLATE", 0.06), ("MEDIAL", 0.1)])
 @pytest.mark.parametrize("arm_length, lift", [(0.6, 0.0), (0.7, -0.45)], ids=["T", "A"])
-def test_joints_lie_where_they_belong(man, method, arm_length, lift):
+def test_joints_lie_where_they_belong(man, method, worst, arm_length, lift):
     """Also if the template stands in a T pose and the mesh in an A pose."""
     child = bare("Child", arm_length, lift)
     rig = embed(child, method=method)
     off = np.linalg.norm(heads(rig) - doll.skeleton(arm_length, lift)[:, 0], axis=1) / HEIGHT
-    assert off.max() < 0.06 and off.mean() < 0.03, dict(zip(doll.NAMES, off.round(3).tolist(), strict=True))
+    assert off.max() < worst and off.mean() < worst / 2, dict(zip(doll.NAMES, off.round(3).tolist(), strict=True))
     left = [name.endswith(".L") for name in doll.NAMES]
     right = [name.endswith(".R") for name in doll.NAMES]
     assert (heads(rig)[left, 0] > 0.03).all() and (heads(rig)[right, 0] < -0.03).all()
