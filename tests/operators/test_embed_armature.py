@@ -91,7 +91,7 @@ def test_refusals_are_sentences_and_make_nothing(man):
         bpy.ops.skinwright.embed_armature()
     bpy.data.objects.remove(flat)
     child = bare("Child", 0.6)
-    child.data.vertices[3].co.z = float("inf")
+    child.data.vertices[3].co.z = float("nan")
     builders.select(child)
     with pytest.raises(RuntimeError, match="Child has a coordinate that is not a number at vertex 3"):
         bpy.ops.skinwright.embed_armature()

@@ -77,7 +77,7 @@ def steps(
         donor = _donor(context, source, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
-    embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
+    embedding = yield native.start_embedding(targets[0].name, (positions, triangles), arrays, donor, **options)
     return _write(context, source, list(targets), bones, embedding, params)
 
 
