@@ -66,7 +66,11 @@ def steps(
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
-    positions, triangles, _ = joined([mesh.read(obj) for obj in targets])
+    shapes = [mesh.read(obj) for obj in targets]
+    for obj, shape in zip(targets, shapes, strict=True):
+        if not len(shape.triangles):
+            raise SceneError(f"{obj.name} has no faces: bones are laid into a surface, so give it some")
+    positions, triangles, _ = joined(shapes)
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
     if params.method == "template":

@@ -14,6 +14,7 @@ pub mod error;
 pub mod fill;
 pub mod inside;
 pub mod laplacian;
+pub mod limit;
 pub mod mesh;
 pub mod penetration;
 pub mod progress;
@@ -26,6 +27,7 @@ pub mod surface;
 pub mod transfer;
 pub mod weights;
 pub mod weld;
+mod welded;
 
 pub use error::{Error, Result};
 pub use mesh::TriMesh;

@@ -1,7 +1,9 @@
 //! A skeleton into a mesh that has none.
 
+mod hierarchy;
 mod joints;
 mod medial;
+mod posed;
 mod report;
 mod template;
 

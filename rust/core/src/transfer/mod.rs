@@ -3,12 +3,11 @@
 //!
 //! Match -> constraints -> fill -> smooth -> islands -> limit. Vertices near the source with agreeing normals copy its weights
 //! ([`matching`]); the others are solved for by the part [`fill`](crate::fill); parts without any match follow an
-//! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used
+//! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`](crate::limit) on influences. [`Inpainting`] keeps what can be used
 //! again.
 
 mod detail;
 mod islands;
-pub mod limit;
 pub mod matching;
 mod normals;
 mod pipeline;
