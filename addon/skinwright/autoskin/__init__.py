@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import csr, jobs
 from ..reporting import AutoskinReport, SkinnedMesh
-from ..scene import armature, vertex_groups, weight_state
+from ..scene import armature, object_state, vertex_groups
 from .compute import Answer, compute
 from .inputs import Target, read
 from .params import AutoskinParams
@@ -37,7 +37,7 @@ def steps(
     answers = yield from compute(targets, params)
     if before_write:
         before_write(objects)
-    with weight_state.all_or_nothing(objects):
+    with object_state.all_or_nothing(objects):
         return AutoskinReport([_write(target, answer, params) for target, answer in zip(targets, answers, strict=True)])
 
 

@@ -14,7 +14,7 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names
 from ..retarget.inputs import joined, joined_rows
-from ..scene import armature, embedded, mesh, rest_bones
+from ..scene import armature, embedded, mesh, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from .params import EmbedParams
@@ -125,11 +125,15 @@ def _write(
     confidence = dict(zip(bones.names, embedding.confidence.tolist(), strict=True))
     places = {b: (h, t) for b, h, t in zip(bones.names, embedding.heads, embedding.tails, strict=True)}
     rig = embedded.create(context, name, source, bones, places)
-    embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
-    if params.bind:
-        for obj in targets:
-            if armature.find(obj) is None:
-                armature.bind(obj, rig)
+    try:
+        with object_state.all_or_nothing(targets):
+            embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
+            for obj in targets if params.bind else ():
+                if armature.find(obj) is None:
+                    armature.bind(obj, rig)
+    except BaseException:
+        embedded.remove(rig)
+        raise
     outside = [bones.names[j] for j in embedding.report["outside"]]
     warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
     return EmbedReport(

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -78,9 +79,15 @@ class _Key:
 
 
 def steps(
-    obj: bpy.types.Object, params: CorrectiveParams, chosen: set[str] | None = None
+    obj: bpy.types.Object,
+    params: CorrectiveParams,
+    chosen: set[str] | None = None,
+    certify: Callable[[CorrectiveReport], None] | None = None,
 ) -> "jobs.Jobs[CorrectiveReport]":
-    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved."""
+    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved.
+
+    If `certify`, which gets the report once the keys are there, raises, the keys go again.
+    """
     driven_keys.check(obj)
     character = characters.read(obj)
     bones = joints(character, chosen or set())
@@ -98,7 +105,10 @@ def steps(
                 f"{obj.name}: no finite offsets at {character.bones[key.sample.bone]}; nothing was written"
             )
     report.certificates = [certificate for _, certificate in kept]
-    _write(obj, character, [key for key, _ in kept], report)
+    with driven_keys.all_or_nothing(obj, RECORD):
+        _write(obj, character, [key for key, _ in kept], report)
+        if certify:
+            certify(report)
     return report
 
 
@@ -176,6 +186,7 @@ def remove(obj: bpy.types.Object) -> int:
     record = baked(obj)
     if record is None:
         return 0
-    count = driven_keys.remove(obj, record["keys"], basis_too=record.get("made_basis", False))
-    del obj[RECORD]
+    with driven_keys.all_or_nothing(obj, RECORD):
+        count = driven_keys.remove(obj, record["keys"], basis_too=record.get("made_basis", False))
+        del obj[RECORD]
     return count

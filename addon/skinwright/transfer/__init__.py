@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import csr, jobs, soundness
 from ..reporting import Report
-from ..scene import mesh, weight_state
+from ..scene import mesh, object_state
 from ..scene.error import SceneError
 from .checks import check_source, source_warnings, target_problem
 from .compute import Failure, compute
@@ -57,7 +57,8 @@ def steps(
         written = [planned.garment.object for planned in plans]
         if before_write:
             before_write(written)
-        with weight_state.all_or_nothing(written):
+        bound = [planned.garment.object for planned in plans if planned.undo is not None]
+        with object_state.all_or_nothing(written, reshaped=bound):
             reports = [write(body, planned, params) for planned in plans]
     warnings = source_warnings(body, reports[0].native)
     return Report(body.name, reports, warnings, [failure.sentence for failure in failures])

@@ -11,7 +11,7 @@ use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, enter};
+use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked};
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
@@ -28,8 +28,8 @@ impl Refiner {
     /// Runs `work` with the GIL freed, on the kept pool: starting threads takes longer than a stage of a frame.
     fn enter<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> PyResult<T> {
         match &self.pool {
-            Some(pool) => enter(py, 0, || pool.install(work)),
-            None => enter(py, 0, work),
+            Some(pool) if !is_forked() => enter(py, 0, || pool.install(work)),
+            _ => enter(py, 0, work),
         }
     }
 }
@@ -64,8 +64,8 @@ impl Refiner {
             core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())
         };
         let core = enter(py, threads, build)?;
-        let pool = (threads > 0)
-            .then(|| ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"));
+        let pool = (threads > 0).then(|| ThreadPoolBuilder::new().num_threads(threads).build()).transpose();
+        let pool = pool.map_err(|error| SkinwrightError::new_err(format!("no threads can be started: {error}")))?;
         Ok(Self { core, pool, last: Mutex::new(None) })
     }
 

@@ -88,7 +88,7 @@ macro_rules! retarget_function {
             bone_map: Vector<'_, i32>,
             method: &str,
             landmarks: Option<Matrix<'_, u32>>,
-            max_influences: usize,
+            #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
             #[pyo3(from_py_with = ranges::threads)] threads: usize,
             source_parents: Option<Vector<'_, i32>>,
             match_points: &str,
@@ -97,8 +97,8 @@ macro_rules! retarget_function {
             max_distance: f64,
             max_normal_angle: f64,
             max_stretch: f64,
-            n_pairs: usize,
-            smoothing_iterations: u32,
+            #[pyo3(from_py_with = ranges::pairs)] n_pairs: usize,
+            #[pyo3(from_py_with = ranges::smoothing)] smoothing_iterations: u32,
             smoothing_factor: f64,
         ) -> PyResult<$returns> {
             let settings = Settings {
