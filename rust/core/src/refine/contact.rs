@@ -6,6 +6,7 @@ use std::collections::HashSet;
 use glam::Vec3;
 
 use super::pairs::{intersecting_pairs, intersecting_pairs_of};
+use super::region::Region;
 use super::surface::Surface;
 
 /// Rounds of pushing.
@@ -26,11 +27,47 @@ pub(super) struct Contact {
 }
 
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
-pub(super) struct Skin<'a> {
-    pub(super) triangles: &'a [[u32; 3]],
-    pub(super) names: &'a (dyn Fn(u32) -> u32 + Sync),
-    pub(super) ring: &'a dyn Fn(u32) -> &'a [u32],
-    pub(super) is_free: &'a dyn Fn(u32) -> bool,
+pub(super) trait Skin: Sync {
+    fn triangles(&self) -> &[[u32; 3]];
+    fn name(&self, triangle: u32) -> u32;
+    fn ring(&self, vertex: u32) -> &[u32];
+    fn is_free(&self, vertex: u32) -> bool;
+}
+
+impl Skin for Surface {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn name(&self, triangle: u32) -> u32 {
+        triangle
+    }
+
+    fn ring(&self, vertex: u32) -> &[u32] {
+        self.ring(vertex as usize)
+    }
+
+    fn is_free(&self, _vertex: u32) -> bool {
+        true
+    }
+}
+
+impl Skin for Region {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn name(&self, triangle: u32) -> u32 {
+        self.triangle_names[triangle as usize]
+    }
+
+    fn ring(&self, vertex: u32) -> &[u32] {
+        self.ring(vertex)
+    }
+
+    fn is_free(&self, vertex: u32) -> bool {
+        self.is_free(vertex)
+    }
 }
 
 impl Contact {
@@ -39,33 +76,38 @@ impl Contact {
         Self { at_rest: intersecting_pairs(&rest, &surface.triangles).into_iter().collect() }
     }
 
-    fn pairs(&self, skin: &Skin<'_>, places: &[Vec3], among: Option<&[u32]>) -> Vec<[u32; 2]> {
+    /// The pairs of all of the skin's triangles that do not intersect at rest.
+    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3]) -> Vec<[u32; 2]> {
+        self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>())
+    }
+
+    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
         let at = |i: u32| places[i as usize];
-        let mut pairs = intersecting_pairs_of(&at, skin.triangles, among);
+        let mut pairs = intersecting_pairs_of(&at, skin.triangles(), among);
         pairs.retain(|&[a, b]| {
-            let [a, b] = [(skin.names)(a), (skin.names)(b)];
+            let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
         });
         pairs
     }
 
     /// Pushes until no pair of triangles intersects that does not at rest; if some remain, the round with the fewest counts.
-    /// Returns the vertices that moved, ascending.
-    pub(super) fn part(&self, skin: &Skin<'_>, places: &mut Vec<Vec3>) -> Vec<u32> {
-        let mut pairs = self.pairs(skin, places, None);
+    /// Returns the vertices that moved, ascending, and the number of pairs that remain.
+    pub(super) fn part(&self, skin: &dyn Skin, places: &mut Vec<Vec3>) -> (Vec<u32>, usize) {
+        let mut pairs = self.all_pairs(skin, places);
         if pairs.is_empty() {
-            return Vec::new();
+            return (Vec::new(), 0);
         }
         let around = grown(skin, corners(skin, &pairs), RINGS);
         let near: HashSet<u32> = around.iter().copied().collect();
-        let among: Vec<u32> = (0..skin.triangles.len() as u32)
-            .filter(|&t| skin.triangles[t as usize].iter().any(|i| near.contains(i)))
+        let among: Vec<u32> = (0..skin.triangles().len() as u32)
+            .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
             .collect();
         let mut now = places.clone();
         let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
         for _ in 0..ROUNDS {
             moved.extend(push(skin, &mut now, &pairs));
-            pairs = self.pairs(skin, &now, Some(&among));
+            pairs = self.pairs(skin, &now, &among);
             stalled += 1;
             if pairs.len() < fewest {
                 (fewest, stalled) = (pairs.len(), 0);
@@ -77,20 +119,20 @@ impl Contact {
         }
         moved.sort_unstable();
         moved.dedup();
-        moved
+        (moved, fewest)
     }
 }
 
-fn corners(skin: &Skin<'_>, pairs: &[[u32; 2]]) -> Vec<u32> {
-    let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles[t as usize]).collect();
+fn corners(skin: &dyn Skin, pairs: &[[u32; 2]]) -> Vec<u32> {
+    let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles()[t as usize]).collect();
     corners.sort_unstable();
     corners.dedup();
     corners
 }
 
-fn grown(skin: &Skin<'_>, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
+fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
     for _ in 0..rings {
-        let ring: Vec<u32> = vertices.iter().flat_map(|&i| (skin.ring)(i)).copied().collect();
+        let ring: Vec<u32> = vertices.iter().flat_map(|&i| skin.ring(i)).copied().collect();
         vertices.extend(ring);
         vertices.sort_unstable();
         vertices.dedup();
@@ -100,8 +142,8 @@ fn grown(skin: &Skin<'_>, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
 
 /// One round: the triangles of a pair move apart along the difference of their normals, then they and the ring around are
 /// smoothed. Returns what moved.
-fn push(skin: &Skin<'_>, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
-    let triangle = |t: u32| skin.triangles[t as usize];
+fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
+    let triangle = |t: u32| skin.triangles()[t as usize];
     let normal = |t: u32| {
         let [a, b, c] = triangle(t).map(|i| places[i as usize]);
         (b - a).cross(c - a).normalize_or_zero()
@@ -120,17 +162,17 @@ fn push(skin: &Skin<'_>, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
         }
     }
     let step = STEP * length / (2 * pairs.len()) as f32;
-    for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| (skin.is_free)(**i)) {
+    for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by.normalize_or_zero() * step;
     }
     let near = grown(skin, touched, 1);
     let mean = |&i: &u32| {
-        let ring = (skin.ring)(i);
+        let ring = skin.ring(i);
         let sum: Vec3 = ring.iter().map(|&n| places[n as usize]).sum();
         if ring.is_empty() { Vec3::ZERO } else { (sum / ring.len() as f32 - places[i as usize]) * SMOOTHING }
     };
     let moves: Vec<Vec3> = near.iter().map(mean).collect();
-    for (&i, by) in near.iter().zip(moves).filter(|(i, _)| (skin.is_free)(**i)) {
+    for (&i, by) in near.iter().zip(moves).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by;
     }
     near

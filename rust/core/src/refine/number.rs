@@ -9,8 +9,8 @@ pub const LANES: usize = 8;
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// A constant.
-    fn constant(value: f32) -> Self;
+    /// A constant of the same kind: wide numbers carry the proof that their instructions exist.
+    fn constant(self, value: f32) -> Self;
     /// The square root.
     fn sqrt(self) -> Self;
 }
@@ -19,7 +19,7 @@ macro_rules! scalar {
     ($kind:ty) => {
         impl Number for $kind {
             #[inline(always)]
-            fn constant(value: f32) -> Self {
+            fn constant(self, value: f32) -> Self {
                 Self::from(value)
             }
 
@@ -74,7 +74,7 @@ impl Neg for Lanes {
 
 impl Number for Lanes {
     #[inline(always)]
-    fn constant(value: f32) -> Self {
+    fn constant(self, value: f32) -> Self {
         Self([value; LANES])
     }
 

@@ -3,12 +3,25 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Triangles that one task compares with those after them.
-const RUN: usize = 256;
+use super::morton::morton;
+
+/// Boxes in a group, and groups in a larger one.
+const WIDE: usize = 8;
+/// Groups that one task compares with all others.
+const RUN: usize = 16;
+/// Steps of the Morton curve's grid along the longest side.
+const STEPS: f32 = (1 << 20) as f32;
 
 /// Every pair of triangles that intersect and share no corner, each once, ascending.
 pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    intersecting_pairs_of(&|i| Vec3::from(positions[i as usize]), triangles, None)
+    let at = |i: u32| Vec3::from(positions[i as usize]);
+    let centre = |t: &[u32; 3]| t.map(at).iter().sum::<Vec3>() / 3.0;
+    let low = positions.iter().fold(Vec3::INFINITY, |low, &p| low.min(p.into()));
+    let high = positions.iter().fold(Vec3::NEG_INFINITY, |high, &p| high.max(p.into()));
+    let scale = STEPS / (high - low).max_element().max(f32::MIN_POSITIVE);
+    let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+    order.sort_by_cached_key(|&t| (morton(((centre(&triangles[t as usize]) - low) * scale).as_ivec3().to_array()), t));
+    intersecting_pairs_of(&at, triangles, &order)
 }
 
 /// A triangle's box, and its number.
@@ -19,50 +32,110 @@ struct Bounds {
     triangle: u32,
 }
 
-/// The same among some triangles (all if none are named).
+impl Bounds {
+    fn overlaps(&self, other: &Self) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+
+    /// Of all of them; the number of the first.
+    fn around(boxes: &[Self]) -> Self {
+        let joined = |a: Self, b: &Self| Self { low: a.low.min(b.low), high: a.high.max(b.high), ..a };
+        boxes[1..].iter().fold(boxes[0], joined)
+    }
+}
+
+/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other.
 ///
-/// Boxes are sorted along the longest axis, and each is compared with those that start before it ends.
+/// Boxes are joined by eights, and those by eights again. Each group of eight looks for others that overlap.
 pub(super) fn intersecting_pairs_of(
     at: &(dyn Fn(u32) -> Vec3 + Sync),
     triangles: &[[u32; 3]],
-    among: Option<&[u32]>,
+    among: &[u32],
 ) -> Vec<[u32; 2]> {
-    let bounds = |triangle: u32| {
+    let bounds = |&triangle: &u32| {
         let [a, b, c] = triangles[triangle as usize].map(at);
         Bounds { low: a.min(b).min(c), high: a.max(b).max(c), triangle }
     };
-    let mut boxes: Vec<Bounds> = match among {
-        Some(among) => among.iter().map(|&t| bounds(t)).collect(),
-        None => (0..triangles.len() as u32).map(bounds).collect(),
+    let mut levels: Vec<Vec<Bounds>> = vec![among.par_iter().with_min_len(RUN * WIDE).map(bounds).collect()];
+    while levels[levels.len() - 1].len() > WIDE {
+        let groups = levels[levels.len() - 1].chunks(WIDE).map(Bounds::around).collect();
+        levels.push(groups);
+    }
+    let of_group = |group: usize| {
+        let mut pairs = Vec::new();
+        if levels.len() > 1 {
+            let top = levels.len() - 1;
+            (0..levels[top].len()).for_each(|k| descend(&levels, top, k, group, at, triangles, &mut pairs));
+        } else {
+            compare(&levels[0], group, group, at, triangles, &mut pairs);
+        }
+        pairs
     };
-    let axis = longest_axis(&boxes);
-    boxes.sort_unstable_by(|a, b| a.low[axis].total_cmp(&b.low[axis]).then(a.triangle.cmp(&b.triangle)));
-    let of_one = |k: usize| {
-        let one = boxes[k];
-        let overlapping = boxes[k + 1..].iter().take_while(|other| other.low[axis] <= one.high[axis]);
-        let near = overlapping.filter(|o| one.low.cmple(o.high).all() && o.low.cmple(one.high).all());
-        let corners = triangles[one.triangle as usize];
-        let meets = near.filter(|o| intersect(at, corners, triangles[o.triangle as usize]));
-        meets.map(|o| [one.triangle.min(o.triangle), one.triangle.max(o.triangle)]).collect::<Vec<_>>()
-    };
-    let mut pairs: Vec<[u32; 2]> = (0..boxes.len()).into_par_iter().with_min_len(RUN).flat_map_iter(of_one).collect();
+    let groups = levels[0].len().div_ceil(WIDE);
+    let found = (0..groups).into_par_iter().with_min_len(RUN).flat_map_iter(of_group);
+    let mut pairs: Vec<[u32; 2]> = found.collect();
     pairs.sort_unstable();
     pairs
 }
 
-fn longest_axis(boxes: &[Bounds]) -> usize {
-    let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    let (low, high) = boxes.iter().fold(empty, |whole, part| (whole.0.min(part.low), whole.1.max(part.high)));
-    (0..3).max_by(|&a, &b| (high - low)[a].total_cmp(&(high - low)[b])).expect("three axes")
+/// Compares group `own` of triangles with those under box `k` of a level that do not come before it.
+fn descend(
+    levels: &[Vec<Bounds>],
+    level: usize,
+    k: usize,
+    own: usize,
+    at: &(dyn Fn(u32) -> Vec3 + Sync),
+    triangles: &[[u32; 3]],
+    pairs: &mut Vec<[u32; 2]>,
+) {
+    let last_below = ((k + 1) * WIDE.pow(level as u32 - 1)).saturating_sub(1);
+    if last_below < own || !levels[1][own].overlaps(&levels[level][k]) {
+        return;
+    }
+    if level == 1 {
+        return compare(&levels[0], own, k, at, triangles, pairs);
+    }
+    let end = ((k + 1) * WIDE).min(levels[level - 1].len());
+    (k * WIDE..end).for_each(|child| descend(levels, level - 1, child, own, at, triangles, pairs));
+}
+
+fn compare(
+    boxes: &[Bounds],
+    own: usize,
+    other: usize,
+    at: &(dyn Fn(u32) -> Vec3 + Sync),
+    triangles: &[[u32; 3]],
+    pairs: &mut Vec<[u32; 2]>,
+) {
+    let range = |group: usize| group * WIDE..((group + 1) * WIDE).min(boxes.len());
+    for i in range(own) {
+        let from = if own == other { i + 1 } else { 0 };
+        for j in range(other).filter(|&j| j >= from) {
+            let (a, b) = (&boxes[i], &boxes[j]);
+            if a.overlaps(b) && intersect(at, triangles[a.triangle as usize], triangles[b.triangle as usize]) {
+                pairs.push([a.triangle.min(b.triangle), a.triangle.max(b.triangle)]);
+            }
+        }
+    }
 }
 
 /// Whether an edge of one passes through the inside of the other. Triangles that share a corner never count.
-fn intersect(at: &dyn Fn(u32) -> Vec3, s: [u32; 3], t: [u32; 3]) -> bool {
+fn intersect(at: &(dyn Fn(u32) -> Vec3 + Sync), s: [u32; 3], t: [u32; 3]) -> bool {
     if s.iter().any(|i| t.contains(i)) {
         return false;
     }
     let (s, t) = (s.map(|i| at(i).as_dvec3()), t.map(|i| at(i).as_dvec3()));
+    if on_one_side(&s, &t) || on_one_side(&t, &s) {
+        return false;
+    }
     (0..3).any(|k| passes(s[k], s[(k + 1) % 3], &t) || passes(t[k], t[(k + 1) % 3], &s))
+}
+
+/// Whether all of one triangle lies strictly on one side of the other's plane, as most neighbours do.
+fn on_one_side(&[a, b, c]: &[DVec3; 3], other: &[DVec3; 3]) -> bool {
+    let normal = (b - a).cross(c - a);
+    let heights = other.map(|p| (p - a).dot(normal));
+    heights.iter().all(|&h| h > 0.0) || heights.iter().all(|&h| h < 0.0)
 }
 
 /// Whether the segment from `a` to `b` crosses a triangle (Möller and Trumbore, 1997).

@@ -1,19 +1,21 @@
 //! One frame: the path from rest in sub-angles, each a few projections and a relaxed crease; then the volume.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
-use super::contact::Skin;
 use super::coupling::{carry_lattice, carry_skin, place, rejoin};
 use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
 use super::local::Local;
-use super::predictor::{follow, place_bound, skinned};
-use super::prepared::Prepared;
-use super::projection::{Energy, Kernel, Stretch, Volume, project, untangle};
+use super::joints::Member;
+use super::predictor::{follow, linear, place_all, place_bound, skinned};
+use super::prepared::{ARM, Prepared, TETRAHEDRON};
+use super::projection::{Flesh, Kernel, Stretch, project, untangle};
+use super::region::Region;
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -76,7 +78,7 @@ pub(super) fn solve(
     if active.is_empty() {
         return Solution { moved: Vec::new(), report: Report::default() };
     }
-    let local = clock.time("region", || Local::new(prepared, &active));
+    let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     frame.walk(&path, quality);
     frame.finish(pose, quality);
@@ -93,7 +95,7 @@ pub(super) fn measure(
 ) -> Vec<JointMeasure> {
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
-    let local = Local::new(prepared, &active);
+    let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
     let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
@@ -102,6 +104,13 @@ pub(super) fn measure(
         JointMeasure { bone: active[k].joint.bone, volume, bulge }
     };
     frame.axes(pose).iter().enumerate().map(of_joint).collect()
+}
+
+fn flesh(settings: &Settings) -> Flesh {
+    let stiff = TETRAHEDRON.powf(4.0 / 3.0);
+    let volume = (settings.volume > 0.0).then(|| (1.0 / settings.volume - 1.0) as f32 * stiff);
+    let energy = (settings.energy > 0.0).then(|| (1.0 / settings.energy) as f32);
+    Flesh { volume: TETRAHEDRON, arm: ARM, volume_compliance: volume, energy_compliance: energy }
 }
 
 struct Frame<'a> {
@@ -126,34 +135,23 @@ impl Frame<'_> {
         let steps = if bends { ((swing / quality.sub_angle()).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
         let iterations = if bends { quality.iterations() } else { TWIST_ITERATIONS };
         let mut before = path.at(if bends { 0.0 } else { 1.0 });
-        let start = skinned(self.prepared, &self.local, &before);
-        for (particle, place) in self.local.particles.iter_mut().zip(&start) {
-            [particle[0], particle[1], particle[2]] = place.to_array();
-        }
+        place_all(self.prepared, &mut self.local, &before);
         for step in 1..=steps {
             let share = step as f64 / steps as f64;
             let pose = path.at(share);
             let axes = self.axes(&pose);
             let mut clock = std::mem::take(&mut self.clock);
             clock.time("predict", || {
-                let skin = skinned(self.prepared, &self.local, &pose);
                 follow(self.prepared, &mut self.local, &before, &pose);
-                place_bound(&mut self.local, &skin, self.active, &axes);
+                place_bound(&mut self.local, self.active, &axes);
             });
             self.clock = clock;
-            self.restart();
+            self.local.restart();
             for _ in 0..iterations {
                 self.iterate(&axes, share as f32);
             }
             before = pose;
         }
-    }
-
-    fn restart(&mut self) {
-        self.local.lattice_stretch.restart();
-        self.local.surface_stretch.restart();
-        self.local.volume.restart();
-        self.local.energy.restart();
     }
 
     fn iterate(&mut self, axes: &[Axis], share: f32) {
@@ -176,51 +174,50 @@ impl Frame<'_> {
 
     fn project_lattice(&mut self) {
         let (settings, local, kernel) = (self.settings, &mut self.local, self.kernel);
+        let region = &local.region;
         if settings.stretch > 0.0 {
             let kind = Stretch((1.0 / settings.stretch) as f32);
-            project(kernel, kind, &mut local.lattice_stretch, &mut local.particles);
+            project(kernel, kind, &region.edges, &mut local.of_edges, &mut local.particles);
+        }
+        let flesh = flesh(settings);
+        if flesh.volume_compliance.is_some() || flesh.energy_compliance.is_some() {
+            project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
         }
         if settings.volume > 0.0 {
-            let kind = Volume((1.0 / settings.volume - 1.0) as f32);
-            project(kernel, kind, &mut local.volume, &mut local.particles);
-            untangle(&local.volume, &mut local.particles, [0.1, 0.3], 8, 1);
-        }
-        if settings.energy > 0.0 {
-            let kind = Energy((1.0 / settings.energy) as f32);
-            project(kernel, kind, &mut local.energy, &mut local.particles);
+            untangle(&region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
         }
     }
 
     fn project_surface(&mut self) {
         if self.settings.stretch > 0.0 {
-            let kind = Stretch((1.0 / self.settings.stretch) as f32);
-            project(self.kernel, kind, &mut self.local.surface_stretch, &mut self.local.particles);
+            let (kind, local) = (Stretch((1.0 / self.settings.stretch) as f32), &mut self.local);
+            project(self.kernel, kind, &local.region.sides, &mut local.of_sides, &mut local.particles);
         }
     }
 
     /// Bind, planes and membranes of every joint.
     fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
         for (k, active) in self.active.iter().enumerate() {
-            let members = std::mem::take(&mut self.local.free[k]);
+            let region = Arc::clone(&self.local.region);
+            let members = &region.free[k];
             if self.settings.bind > 0.0 && active.joint.is_limb {
-                bind_skin(&mut self.local, &axes[k], &members, self.settings.bind as f32);
+                bind_skin(&mut self.local, &axes[k], members, self.settings.bind as f32);
             }
-            if let Some(crease) = self.crease(k, &axes[k], share, &members) {
+            if let Some(crease) = self.crease(k, &axes[k], share, members) {
                 crease.separate(&mut self.local);
                 crease.relax(&mut self.local, &self.prepared.rest, passes);
             }
-            self.local.free[k] = members;
         }
     }
 
     /// Planes alone.
     fn separate(&mut self, axes: &[Axis], share: f32) {
         for k in 0..self.active.len() {
-            let members = std::mem::take(&mut self.local.free[k]);
-            if let Some(crease) = self.crease(k, &axes[k], share, &members) {
+            let region = Arc::clone(&self.local.region);
+            let members = &region.free[k];
+            if let Some(crease) = self.crease(k, &axes[k], share, members) {
                 crease.separate(&mut self.local);
             }
-            self.local.free[k] = members;
         }
     }
 
@@ -229,7 +226,7 @@ impl Frame<'_> {
         k: usize,
         axis: &Axis,
         share: f32,
-        members: &'m [super::joints::Member],
+        members: &'m [Member],
     ) -> Option<Crease<'m>> {
         if !self.settings.self_collision {
             return None;
@@ -245,88 +242,110 @@ impl Frame<'_> {
         clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
         if self.settings.volume > 0.0 {
             clock.time("project", || {
-                untangle(&self.local.volume, &mut self.local.particles, [0.05, 0.3], 8, UNTANGLING);
+                let local = &mut self.local;
+                untangle(&local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, UNTANGLING);
             });
         }
-        let mut parted = clock.time("contact", || self.part());
+        let (mut parted, mut left) = clock.time("contact", || self.part());
         for _ in 0..BALLOONS {
             clock.time("balloon", || {
                 (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
             });
-            let more = clock.time("contact", || self.part());
+            let (more, pairs) = clock.time("contact", || self.part());
+            left = pairs;
             if more.is_empty() {
                 break;
             }
             parted.extend(more);
         }
-        clock.time("balloon", || self.undo_harm(pose, &axes));
+        clock.time("contact", || self.undo_harm(pose, &axes, left));
         self.clock = clock;
     }
 
-    /// Gives a joint back to skinning where solving has cost it far more volume than skinning does: on very coarse skin
-    /// nothing is left of the inner side once it is pressed into the plane.
-    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis]) {
+    /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
+    /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
+        let solved = |p: u32| place(&self.local.particles[p as usize]);
+        let lost = |k: usize| self.measure(k, pose, &axes[k], &solved).0.abs();
+        let suspects: Vec<usize> = (0..self.active.len()).filter(|&k| lost(k) > HARM).collect();
+        if suspects.is_empty() && left == 0 {
+            return;
+        }
+        let skinned = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
+        let after: Vec<Vec3> = self.local.particles.iter().map(place).collect();
+        let [after, both @ ..] = [&after, &skinned[0], &skinned[1]].map(|places| self.pairs_of_joints(places));
+        let better = |k: usize| if both[1][k] < both[0][k] { 1 } else { 0 };
         for k in 0..self.active.len() {
-            let (after, _) = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize]));
-            if after.abs() < HARM {
-                continue;
-            }
-            let skin = skinned(self.prepared, &self.local, pose);
-            let (before, _) = self.measure(k, pose, &axes[k], &|p| skin[p as usize]);
-            if after.abs() < before.abs() + HARM / 2.0 {
-                continue;
-            }
-            for member in &self.local.free[k] {
-                let particle = &mut self.local.particles[member.particle as usize];
-                [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
+            let skin = &skinned[better(k)];
+            let before = self.measure(k, pose, &axes[k], &|p| skin[p as usize]).0.abs();
+            let now = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize])).0.abs();
+            let is_worse = suspects.contains(&k) && now > before + HARM / 2.0;
+            if is_worse || after[k] > both[better(k)][k] {
+                self.give_back(k, skin);
             }
         }
     }
 
-    /// Takes out what folds are left in the region's skin; returns the particles that moved.
-    fn part(&mut self) -> Vec<u32> {
-        if !self.settings.self_collision {
-            return Vec::new();
+    /// Puts a joint's skin where skinning has it.
+    fn give_back(&mut self, k: usize, skin: &[Vec3]) {
+        let Local { region, particles, .. } = &mut self.local;
+        for member in region.free[k].iter().chain(&region.beyond[k]) {
+            let particle = &mut particles[member.particle as usize];
+            [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
         }
+    }
+
+    /// For each joint, the pairs of triangles that pass through each other with a corner in its region.
+    fn pairs_of_joints(&self, places: &[Vec3]) -> Vec<usize> {
         let local = &self.local;
-        let skin = Skin {
-            triangles: &local.triangles,
-            names: &|t| local.triangle_names[t as usize],
-            ring: &|p| local.ring(p),
-            is_free: &|p| local.is_free(p),
+        let pairs = self.prepared.contact.all_pairs(&*local.region, places);
+        let of_joint = |members: &Vec<Member>| {
+            let is_member = |&p: &u32| members.binary_search_by_key(&p, |m| m.particle).is_ok();
+            let touches = |&&[a, b]: &&[u32; 2]| {
+                [a, b].iter().any(|&t| local.triangles[t as usize].iter().any(is_member))
+            };
+            pairs.iter().filter(touches).count()
         };
-        let mut places: Vec<Vec3> = local.particles.iter().map(place).collect();
-        let moved = self.prepared.contact.part(&skin, &mut places);
+        local.region.free.iter().map(of_joint).collect()
+    }
+
+    /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
+    fn part(&mut self) -> (Vec<u32>, usize) {
+        if !self.settings.self_collision {
+            return (Vec::new(), 0);
+        }
+        let mut places: Vec<Vec3> = self.local.particles.iter().map(place).collect();
+        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
         }
-        moved
+        (moved, left)
     }
 
     fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
         if self.settings.volume == 0.0 {
             return;
         }
-        let members = std::mem::take(&mut self.local.free[k]);
+        let region = Arc::clone(&self.local.region);
+        let members = &region.free[k];
         let joint = self.active[k].joint;
-        let crease = self.crease(k, axis, 1.0, &members);
+        let crease = self.crease(k, axis, 1.0, members);
         let mut contacts =
             crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
         contacts.extend(parted);
         let kept = within(&self.local, &self.prepared.rest, &contacts, KEPT * joint.radius);
-        let balloon = Balloon::new(&self.local, &members, &kept);
+        let balloon = Balloon::new(&self.local, members, &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let most = if joint.is_limb { self.settings.bind as f32 } else { 0.0 };
         balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
             if most > 0.0 {
-                bind_skin(local, axis, &members, most);
+                bind_skin(local, axis, members, most);
             }
             if let Some(crease) = crease {
                 crease.separate(local);
             }
         });
-        self.local.free[k] = members;
     }
 
     fn rest_volume(&self, balloon: &Balloon, k: usize) -> f64 {
@@ -346,14 +365,13 @@ impl Frame<'_> {
         let joints = (0..self.active.len()).map(|k| self.joint_report(k, path, pose, &axes[k], &before)).collect();
         let local = &self.local;
         let constraints = [
-            local.lattice_stretch.len() + local.surface_stretch.len(),
-            local.volume.len(),
-            local.energy.len(),
+            local.edges.len() + local.sides.len(),
+            local.tetrahedra.len() * 2,
             local.free.iter().map(Vec::len).sum(),
         ];
         Report {
             joints,
-            active_tetrahedra: local.volume.len(),
+            active_tetrahedra: local.tetrahedra.len(),
             inverted_tetrahedra: local.inverted(),
             constraints: constraints.iter().sum(),
             iterations: self.iterations,
@@ -366,7 +384,7 @@ impl Frame<'_> {
     }
 
     /// Volume of a joint's region against rest, and the farthest that its skin is from the bones against rest.
-    fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &dyn Fn(u32) -> Vec3) -> (f64, f64) {
+    fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &(dyn Fn(u32) -> Vec3 + Sync)) -> (f64, f64) {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
         let balloon = Balloon::new(&self.local, members, &[]);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
