@@ -10,9 +10,9 @@ use super::region::Region;
 use super::surface::Surface;
 
 /// Rounds of pushing.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 60;
 /// Rounds without fewer pairs after which there is no hope.
-const STALLED: usize = 5;
+const STALLED: usize = 12;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
 const STEP: f32 = 0.15;
 /// How far a round moves them and the ring around towards the mean of their neighbours.
@@ -82,8 +82,7 @@ impl Contact {
     }
 
     fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
-        let at = |i: u32| places[i as usize];
-        let mut pairs = intersecting_pairs_of(&at, skin.triangles(), among);
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among);
         pairs.retain(|&[a, b]| {
             let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
@@ -93,7 +92,10 @@ impl Contact {
 
     /// Pushes until no pair of triangles intersects that does not at rest; if some remain, the round with the fewest counts.
     /// Returns the vertices that moved, ascending, and the number of pairs that remain.
-    pub(super) fn part(&self, skin: &dyn Skin, places: &mut Vec<Vec3>) -> (Vec<u32>, usize) {
+    ///
+    /// No vertex moves farther than `farthest`: where whole layers of cloth lie in each other, smoothing would go on until
+    /// nothing is left of them.
+    pub(super) fn part(&self, skin: &dyn Skin, places: &mut Vec<Vec3>, farthest: f32) -> (Vec<u32>, usize) {
         let mut pairs = self.all_pairs(skin, places);
         if pairs.is_empty() {
             return (Vec::new(), 0);
@@ -103,10 +105,15 @@ impl Contact {
         let among: Vec<u32> = (0..skin.triangles().len() as u32)
             .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
             .collect();
-        let mut now = places.clone();
+        let (start, mut now) = (places.clone(), places.clone());
         let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
         for _ in 0..ROUNDS {
-            moved.extend(push(skin, &mut now, &pairs));
+            let pushed = push(skin, &mut now, &pairs, 1 + stalled / 3);
+            for &i in &pushed {
+                let from = start[i as usize];
+                now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
+            }
+            moved.extend(pushed);
             pairs = self.pairs(skin, &now, &among);
             stalled += 1;
             if pairs.len() < fewest {
@@ -140,9 +147,9 @@ fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
     vertices
 }
 
-/// One round: the triangles of a pair move apart along the difference of their normals, then they and the ring around are
-/// smoothed. Returns what moved.
-fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
+/// One round: the triangles of a pair move apart along the difference of their normals, then they and some `rings` around
+/// are smoothed as many times: a fold that stays is wider than it looks. Returns what moved.
+fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) -> Vec<u32> {
     let triangle = |t: u32| skin.triangles()[t as usize];
     let normal = |t: u32| {
         let [a, b, c] = triangle(t).map(|i| places[i as usize]);
@@ -165,15 +172,21 @@ fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
     for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by.normalize_or_zero() * step;
     }
-    let near = grown(skin, touched, 1);
+    let near = grown(skin, touched, rings);
+    for _ in 0..rings {
+        smooth(skin, places, &near);
+    }
+    near
+}
+
+fn smooth(skin: &dyn Skin, places: &mut [Vec3], vertices: &[u32]) {
     let mean = |&i: &u32| {
         let ring = skin.ring(i);
         let sum: Vec3 = ring.iter().map(|&n| places[n as usize]).sum();
         if ring.is_empty() { Vec3::ZERO } else { (sum / ring.len() as f32 - places[i as usize]) * SMOOTHING }
     };
-    let moves: Vec<Vec3> = near.iter().map(mean).collect();
-    for (&i, by) in near.iter().zip(moves).filter(|(i, _)| skin.is_free(**i)) {
+    let moves: Vec<Vec3> = vertices.iter().map(mean).collect();
+    for (&i, by) in vertices.iter().zip(moves).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by;
     }
-    near
 }

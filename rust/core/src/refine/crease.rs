@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::constraint::{Axis, HalfSpace, bind, self_collision};
@@ -133,8 +133,9 @@ pub(super) fn within(local: &Local, rest: &[Vec3], seeds: &[u32], distance: f32)
 pub(super) fn smooth(local: &mut Local, vertices: &[u32], k: f32) {
     let mean = |&p: &u32| {
         let ring = local.ring(p);
-        let sum: Vec3 = ring.iter().map(|&n| place(&local.particles[n as usize])).sum();
-        if ring.is_empty() { Vec3::ZERO } else { (sum / ring.len() as f32 - place(&local.particles[p as usize])) * k }
+        let sum: Vec4 = ring.iter().map(|&n| Vec4::from(local.particles[n as usize])).sum();
+        let away = sum / ring.len() as f32 - Vec4::from(local.particles[p as usize]);
+        if ring.is_empty() { Vec3::ZERO } else { away.truncate() * k }
     };
     let moves: Vec<Vec3> = vertices.par_iter().with_min_len(RUN).map(mean).collect();
     vertices.iter().zip(moves).for_each(|(&p, by)| shift(&mut local.particles[p as usize], by));

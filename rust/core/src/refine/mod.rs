@@ -152,7 +152,8 @@ impl Refiner {
     fn part_limbs(&self, positions: &mut [[f32; 3]]) {
         let surface = &self.prepared.surface;
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
-        if self.prepared.contact.part(surface, &mut places).0.is_empty() {
+        let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        if self.prepared.contact.part(surface, &mut places, farthest).0.is_empty() {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {

@@ -13,6 +13,8 @@ pub trait Number:
     fn constant(self, value: f32) -> Self;
     /// The square root.
     fn sqrt(self) -> Self;
+    /// The lesser of two numbers, neither of which may be NaN.
+    fn lesser(self, other: Self) -> Self;
 }
 
 macro_rules! scalar {
@@ -26,6 +28,11 @@ macro_rules! scalar {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 self.sqrt()
+            }
+
+            #[inline(always)]
+            fn lesser(self, other: Self) -> Self {
+                if self < other { self } else { other }
             }
         }
     };
@@ -82,6 +89,14 @@ impl Number for Lanes {
     fn sqrt(mut self) -> Self {
         for lane in 0..LANES {
             self.0[lane] = self.0[lane].sqrt();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn lesser(mut self, other: Self) -> Self {
+        for lane in 0..LANES {
+            self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
         }
         self
     }

@@ -85,4 +85,12 @@ impl Quality {
             Self::Bake => 10,
         }
     }
+
+    /// Times that the volume is restored and the folds that this makes are taken out.
+    pub(super) fn balloons(self) -> usize {
+        match self {
+            Self::Live => 1,
+            Self::Bake => 2,
+        }
+    }
 }

@@ -7,7 +7,7 @@ use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
-use super::coupling::{carry_lattice, carry_skin, place, rejoin};
+use super::coupling::{carry_lattice, carry_skin, place};
 use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
 use super::local::Local;
@@ -36,8 +36,8 @@ const PASSES: usize = 2;
 const UNTANGLING: usize = 12;
 /// Loss of a joint's volume from which it is asked whether skinning did better.
 const HARM: f64 = 0.1;
-/// Times that the volume is restored and the folds that this makes are taken out.
-const BALLOONS: usize = 2;
+/// How far, in cells, skin that has come through skin is moved back.
+pub(super) const FARTHEST: f32 = 1.5;
 
 /// Times of the stages, by name, in the order they first ran.
 #[derive(Default)]
@@ -159,10 +159,7 @@ impl Frame<'_> {
         let nodes = self.local.nodes;
         let before = self.local.particles[..nodes].to_vec();
         clock.time("project", || self.project_lattice());
-        clock.time("couple", || {
-            carry_skin(&mut self.local, &before);
-            rejoin(&mut self.local, REJOIN);
-        });
+        clock.time("couple", || carry_skin(&mut self.local, &before, REJOIN));
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
         clock.time("crease", || self.limit(axes, share, PASSES));
@@ -184,7 +181,7 @@ impl Frame<'_> {
             project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
         }
         if settings.volume > 0.0 {
-            untangle(&region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
+            untangle(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
         }
     }
 
@@ -243,11 +240,11 @@ impl Frame<'_> {
         if self.settings.volume > 0.0 {
             clock.time("project", || {
                 let local = &mut self.local;
-                untangle(&local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, UNTANGLING);
+                untangle(self.kernel, &local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, UNTANGLING);
             });
         }
         let (mut parted, mut left) = clock.time("contact", || self.part());
-        for _ in 0..BALLOONS {
+        for _ in 0..quality.balloons() {
             clock.time("balloon", || {
                 (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
             });
@@ -265,25 +262,48 @@ impl Frame<'_> {
     /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
     /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
     fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
-        let solved = |p: u32| place(&self.local.particles[p as usize]);
-        let lost = |k: usize| self.measure(k, pose, &axes[k], &solved).0.abs();
-        let suspects: Vec<usize> = (0..self.active.len()).filter(|&k| lost(k) > HARM).collect();
+        let all = 0..self.active.len();
+        let lost = |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
+        let solved = self.places();
+        let suspects: Vec<usize> = all.clone().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
         if suspects.is_empty() && left == 0 {
             return;
         }
-        let skinned = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
-        let after: Vec<Vec3> = self.local.particles.iter().map(place).collect();
-        let [after, both @ ..] = [&after, &skinned[0], &skinned[1]].map(|places| self.pairs_of_joints(places));
-        let better = |k: usize| if both[1][k] < both[0][k] { 1 } else { 0 };
-        for k in 0..self.active.len() {
-            let skin = &skinned[better(k)];
-            let before = self.measure(k, pose, &axes[k], &|p| skin[p as usize]).0.abs();
-            let now = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize])).0.abs();
-            let is_worse = suspects.contains(&k) && now > before + HARM / 2.0;
-            if is_worse || after[k] > both[better(k)][k] {
+        let skins = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
+        let totals = skins.each_ref().map(|skin| self.pairs(skin).len());
+        let skin = &skins[usize::from(totals[1] < totals[0])];
+        for k in suspects {
+            if lost(self, k, &solved).abs() > lost(self, k, skin).abs() + HARM / 2.0 {
                 self.give_back(k, skin);
             }
         }
+        let most = totals[0].min(totals[1]);
+        let mut left = self.pairs(&self.places());
+        for k in all.clone() {
+            if left.len() <= most {
+                return;
+            }
+            let before = self.local.particles.clone();
+            self.give_back(k, skin);
+            let now = self.pairs(&self.places());
+            if now.len() < left.len() {
+                left = now;
+            } else {
+                self.local.particles = before;
+            }
+        }
+        if left.len() > most {
+            all.for_each(|k| self.give_back(k, skin));
+        }
+    }
+
+    fn places(&self) -> Vec<Vec3> {
+        self.local.particles.iter().map(place).collect()
+    }
+
+    /// The pairs of the region's triangles that pass through each other, but for those that do at rest.
+    fn pairs(&self, places: &[Vec3]) -> Vec<[u32; 2]> {
+        self.prepared.contact.all_pairs(&*self.local.region, places)
     }
 
     /// Puts a joint's skin where skinning has it.
@@ -295,27 +315,13 @@ impl Frame<'_> {
         }
     }
 
-    /// For each joint, the pairs of triangles that pass through each other with a corner in its region.
-    fn pairs_of_joints(&self, places: &[Vec3]) -> Vec<usize> {
-        let local = &self.local;
-        let pairs = self.prepared.contact.all_pairs(&*local.region, places);
-        let of_joint = |members: &Vec<Member>| {
-            let is_member = |&p: &u32| members.binary_search_by_key(&p, |m| m.particle).is_ok();
-            let touches = |&&[a, b]: &&[u32; 2]| {
-                [a, b].iter().any(|&t| local.triangles[t as usize].iter().any(is_member))
-            };
-            pairs.iter().filter(touches).count()
-        };
-        local.region.free.iter().map(of_joint).collect()
-    }
-
     /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
     fn part(&mut self) -> (Vec<u32>, usize) {
         if !self.settings.self_collision {
             return (Vec::new(), 0);
         }
-        let mut places: Vec<Vec3> = self.local.particles.iter().map(place).collect();
-        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places);
+        let mut places = self.places();
+        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, FARTHEST);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();

@@ -64,6 +64,32 @@ impl<const N: usize, const M: usize> Batch<N, M> {
         batch
     }
 
+    /// Those at the positions `kept` (ascending) alone.
+    pub(super) fn subset(&self, kept: &[u32]) -> Self {
+        let below = |position: usize| kept.partition_point(|&k| (k as usize) < position);
+        let column = |values: &Vec<u32>| kept.iter().map(|&k| values[k as usize]).collect();
+        let mut spans = self.spans.clone();
+        let mut ends = Vec::new();
+        self.blocks.visit(1, &mut |block| {
+            let span = self.spans[block];
+            let (from, first) = (below(span.from), ends.len());
+            let mut before = from as u32;
+            for &end in &self.ends[span.runs.0..span.runs.1] {
+                let end = below(end as usize) as u32;
+                ends.extend((end > before).then_some(end));
+                before = end;
+            }
+            spans[block] = Span { from, to: before as usize, runs: (first, ends.len()) };
+        });
+        Self {
+            particles: self.particles.each_ref().map(column),
+            rest: self.rest.each_ref().map(|values| kept.iter().map(|&k| values[k as usize]).collect()),
+            blocks: self.blocks,
+            spans,
+            ends,
+        }
+    }
+
     /// Number of constraints.
     pub fn len(&self) -> usize {
         self.particles[0].len()

@@ -51,6 +51,20 @@ impl Kind<4, 0, 2> for Flesh {
     }
 }
 
+/// Tetrahedra below a volume are brought up to it; others are left alone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fill(pub(super) f32);
+
+impl Kind<4, 0, 0> for Fill {
+    #[inline(always)]
+    fn project<T: Number>(self, places: &mut [Vector<T>; 4], w: [T; 4], _rest: [T; 0], _multipliers: &mut [T; 0]) {
+        let zero = w[0].constant(0.0);
+        let Constraint { value, gradient } = volume(*places, w[0].constant(self.0));
+        let one_sided = Constraint { value: value.lesser(zero), gradient };
+        apply(one_sided, places, w, zero, &mut zero.constant(0.0));
+    }
+}
+
 #[inline(always)]
 fn apply<T: Number, const N: usize>(
     constraint: Constraint<T, N>,

@@ -3,16 +3,19 @@
 use rayon::prelude::*;
 
 use super::super::constraint::volume;
-use super::batch::{Batch, Particle};
+use super::batch::{Batch, Multipliers, Particle};
+use super::kind::Fill;
+use super::{Kernel, project};
 
 /// Tetrahedra that one task looks at.
-const RUN: usize = 2048;
+const RUN: usize = 4096;
 
-/// Projects the constraints of tetrahedra that have less than `least` of the volume `at_rest` towards `target` of it, one
-/// by one, `passes` times over those that stay so thin; then looks for others, `rounds` times in all.
+/// Brings tetrahedra that have less than `least` of the volume `at_rest` up to `target` of it, `passes` times over them;
+/// then looks for others, `rounds` times in all.
 ///
 /// The sweeps converge slowly where a bend turns tetrahedra inside out; there are few of them.
 pub fn untangle(
+    kernel: Kernel,
     batch: &Batch<4, 0>,
     at_rest: f32,
     particles: &mut [Particle],
@@ -20,26 +23,30 @@ pub fn untangle(
     passes: usize,
     rounds: usize,
 ) {
-    let corners = |k: usize| [0, 1, 2, 3].map(|n| batch.particles[n][k] as usize);
-    let value = |particles: &[Particle], k: usize, share: f32| {
-        let places = corners(k).map(|p| [particles[p][0], particles[p][1], particles[p][2]]);
-        volume(places, share * at_rest)
-    };
     for _ in 0..rounds {
-        let thin = |&k: &usize| value(particles, k, least).value < 0.0;
-        let mut left: Vec<usize> = (0..batch.len()).into_par_iter().with_min_len(RUN).filter(thin).collect();
-        if left.is_empty() {
+        let thin = batch.subset(&thin(batch, particles, least * at_rest));
+        if thin.is_empty() {
             return;
         }
         for _ in 0..passes {
-            for &k in &left {
-                let at = corners(k);
-                let step = value(particles, k, target).project(at.map(|p| particles[p][3]), 0.0, 0.0);
-                for (p, by) in at.into_iter().zip(step.moves) {
-                    (0..3).for_each(|c| particles[p][c] += by[c]);
-                }
-            }
-            left.retain(|&k| value(particles, k, least).value < 0.0);
+            project(kernel, Fill(target * at_rest), &thin, &mut Multipliers::new(0), particles);
         }
     }
+}
+
+/// The tetrahedra with a volume of less than `least`, ascending.
+fn thin(batch: &Batch<4, 0>, particles: &[Particle], least: f32) -> Vec<u32> {
+    let [a, b, c, d] = &batch.particles;
+    let of_run = |run: usize| {
+        let of_one = |k: usize| {
+            let places = [a[k], b[k], c[k], d[k]].map(|p| {
+                let [x, y, z, _] = particles[p as usize];
+                [x, y, z]
+            });
+            volume(places, least).value
+        };
+        let end = ((run + 1) * RUN).min(batch.len());
+        (run * RUN..end).filter(|&k| of_one(k) < 0.0).map(|k| k as u32).collect::<Vec<_>>()
+    };
+    (0..batch.len().div_ceil(RUN)).into_par_iter().flat_map_iter(of_run).collect()
 }

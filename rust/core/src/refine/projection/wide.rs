@@ -56,6 +56,11 @@ impl Number for Wide {
     fn sqrt(self) -> Self {
         Self { value: self.simd.sqrt_f32s(self.value), ..self }
     }
+
+    #[inline(always)]
+    fn lesser(self, other: Self) -> Self {
+        Self { value: self.simd.min_f32s(self.value, other.value), ..self }
+    }
 }
 
 impl Register for Wide {
