@@ -11,8 +11,10 @@ use super::surface::Surface;
 
 /// Rounds of pushing.
 const ROUNDS: usize = 60;
-/// Rounds without fewer pairs after which there is no hope.
-const STALLED: usize = 12;
+/// Rounds without fewer pairs after which more skin around is smoothed.
+const PATIENCE: usize = 3;
+/// The widest smoothing, as a share of how far skin may move: edges of coarse skin are longer, and a ring of them is a limb.
+const WIDEST: f32 = 1.4;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
 const STEP: f32 = 0.15;
 /// How far a round moves them and the ring around towards the mean of their neighbours.
@@ -32,6 +34,8 @@ pub(super) trait Skin: Sync {
     fn name(&self, triangle: u32) -> u32;
     fn ring(&self, vertex: u32) -> &[u32];
     fn is_free(&self, vertex: u32) -> bool;
+    /// The connected component of a triangle.
+    fn island(&self, triangle: u32) -> u32;
 }
 
 impl Skin for Surface {
@@ -49,6 +53,10 @@ impl Skin for Surface {
 
     fn is_free(&self, _vertex: u32) -> bool {
         true
+    }
+
+    fn island(&self, triangle: u32) -> u32 {
+        self.island[self.triangles[triangle as usize][0] as usize]
     }
 }
 
@@ -68,6 +76,10 @@ impl Skin for Region {
     fn is_free(&self, vertex: u32) -> bool {
         self.is_free(vertex)
     }
+
+    fn island(&self, triangle: u32) -> u32 {
+        self.triangle_islands[triangle as usize]
+    }
 }
 
 impl Contact {
@@ -81,6 +93,14 @@ impl Contact {
         self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>())
     }
 
+    /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
+    /// which is the outer one cannot be told: pushing and smoothing would eat them up.
+    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
+        let mut pairs = self.pairs(skin, places, among);
+        pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
+        pairs
+    }
+
     fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
         let mut pairs = intersecting_pairs_of(places, skin.triangles(), among);
         pairs.retain(|&[a, b]| {
@@ -90,13 +110,19 @@ impl Contact {
         pairs
     }
 
-    /// Pushes until no pair of triangles intersects that does not at rest; if some remain, the round with the fewest counts.
+    /// Pushes until no pair of the `suspects` intersects that does not at rest; if some remain, the round with the fewest counts.
     /// Returns the vertices that moved, ascending, and the number of pairs that remain.
     ///
     /// No vertex moves farther than `farthest`: where whole layers of cloth lie in each other, smoothing would go on until
     /// nothing is left of them.
-    pub(super) fn part(&self, skin: &dyn Skin, places: &mut Vec<Vec3>, farthest: f32) -> (Vec<u32>, usize) {
-        let mut pairs = self.all_pairs(skin, places);
+    pub(super) fn part(
+        &self,
+        skin: &dyn Skin,
+        places: &mut Vec<Vec3>,
+        suspects: &[u32],
+        farthest: f32,
+    ) -> (Vec<u32>, usize) {
+        let mut pairs = self.own_pairs(skin, places, suspects);
         if pairs.is_empty() {
             return (Vec::new(), 0);
         }
@@ -106,21 +132,22 @@ impl Contact {
             .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
             .collect();
         let (start, mut now) = (places.clone(), places.clone());
+        let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().clamp(1.0, 4.0) as usize;
         let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
         for _ in 0..ROUNDS {
-            let pushed = push(skin, &mut now, &pairs, 1 + stalled / 3);
+            let pushed = push(skin, &mut now, &pairs, (1 + stalled / PATIENCE).min(most_rings));
             for &i in &pushed {
                 let from = start[i as usize];
                 now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
             }
             moved.extend(pushed);
-            pairs = self.pairs(skin, &now, &among);
+            pairs = self.own_pairs(skin, &now, &among);
             stalled += 1;
             if pairs.len() < fewest {
                 (fewest, stalled) = (pairs.len(), 0);
                 places.clone_from(&now);
             }
-            if pairs.is_empty() || stalled == STALLED {
+            if pairs.is_empty() || stalled == PATIENCE * most_rings + 2 {
                 break;
             }
         }
@@ -157,18 +184,15 @@ fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) 
     };
     let touched = corners(skin, pairs);
     let mut pushes = vec![Vec3::ZERO; touched.len()];
-    let mut length = 0.0;
     for &[a, b] in pairs {
         let apart = (normal(b) - normal(a)).normalize_or_zero();
         for (t, by) in [(a, apart), (b, -apart)] {
             for i in triangle(t) {
                 pushes[touched.binary_search(&i).expect("a corner")] += by;
             }
-            let [i, j, _] = triangle(t).map(|i| places[i as usize]);
-            length += i.distance(j);
         }
     }
-    let step = STEP * length / (2 * pairs.len()) as f32;
+    let step = STEP * mean_edge(skin, places, pairs);
     for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by.normalize_or_zero() * step;
     }
@@ -177,6 +201,16 @@ fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) 
         smooth(skin, places, &near);
     }
     near
+}
+
+/// The mean length of edges of triangles that pass through each other.
+fn mean_edge(skin: &dyn Skin, places: &[Vec3], pairs: &[[u32; 2]]) -> f32 {
+    let edge = |&t: &u32| {
+        let [i, j, _] = skin.triangles()[t as usize].map(|i| places[i as usize]);
+        i.distance(j)
+    };
+    let sum: f32 = pairs.as_flattened().iter().map(edge).sum();
+    (sum / (2 * pairs.len()) as f32).max(f32::MIN_POSITIVE)
 }
 
 fn smooth(skin: &dyn Skin, places: &mut [Vec3], vertices: &[u32]) {

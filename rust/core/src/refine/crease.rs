@@ -81,11 +81,11 @@ impl Crease<'_> {
         (SMOOTHING * (FINE / edge).powi(2).min(1.0), repeats as usize)
     }
 
-    /// Passes of the membrane: towards the neighbours' mean, then back to the own side.
-    pub(super) fn relax(&self, local: &mut Local, rest: &[Vec3], passes: usize) {
+    /// Passes of the membrane: towards the neighbours' mean, then back to the own side. Returns its vertices.
+    pub(super) fn relax(&self, local: &mut Local, rest: &[Vec3], passes: usize) -> Vec<u32> {
         let contacts = self.contacts(local, TOUCH * self.radius);
         if contacts.is_empty() {
-            return;
+            return contacts;
         }
         let near = within(local, rest, &contacts, WIDTH * self.radius);
         let members: Vec<Member> = {
@@ -99,6 +99,7 @@ impl Crease<'_> {
             self.separate_some(local, &members);
         }
         self.separate(local);
+        near
     }
 }
 

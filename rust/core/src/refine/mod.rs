@@ -152,8 +152,9 @@ impl Refiner {
     fn part_limbs(&self, positions: &mut [[f32; 3]]) {
         let surface = &self.prepared.surface;
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
+        let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
-        if self.prepared.contact.part(surface, &mut places, farthest).0.is_empty() {
+        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {

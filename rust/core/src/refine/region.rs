@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
+use super::contact::Skin;
 use super::projection::{Batch, Blocks};
 
 const NONE: u32 = u32::MAX;
@@ -45,6 +46,8 @@ pub(super) struct Region {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Their numbers in the surface.
     pub(super) triangle_names: Vec<u32>,
+    /// And their connected components.
+    pub(super) triangle_islands: Vec<u32>,
 }
 
 /// The last region, for poses with the same joints and reaches: it depends on nothing else.
@@ -125,6 +128,7 @@ impl Region {
             ring_starts,
             rings,
             triangles: chosen.triangles.iter().map(named).collect(),
+            triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island(t)).collect(),
             triangle_names: chosen.triangles,
             global,
         }

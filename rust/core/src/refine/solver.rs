@@ -32,8 +32,6 @@ const KEPT: f32 = 0.3;
 const IN_CONTACT: f32 = 0.04;
 /// Passes over the creases in each iteration.
 const PASSES: usize = 2;
-/// Times that tetrahedra turned inside out are looked for at the end.
-const UNTANGLING: usize = 12;
 /// Loss of a joint's volume from which it is asked whether skinning did better.
 const HARM: f64 = 0.1;
 /// How far, in cells, skin that has come through skin is moved back.
@@ -147,29 +145,29 @@ impl Frame<'_> {
             });
             self.clock = clock;
             self.local.restart();
-            for _ in 0..iterations {
-                self.iterate(&axes, share as f32);
+            for iteration in 1..=iterations {
+                self.iterate(&axes, share as f32, quality == Quality::Bake || iteration == iterations);
             }
             before = pose;
         }
     }
 
-    fn iterate(&mut self, axes: &[Axis], share: f32) {
+    fn iterate(&mut self, axes: &[Axis], share: f32, untangles: bool) {
         let mut clock = std::mem::take(&mut self.clock);
         let nodes = self.local.nodes;
         let before = self.local.particles[..nodes].to_vec();
-        clock.time("project", || self.project_lattice());
+        clock.time("project", || self.project_lattice(untangles));
         clock.time("couple", || carry_skin(&mut self.local, &before, REJOIN));
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
-        clock.time("crease", || self.limit(axes, share, PASSES));
+        clock.time("crease", || _ = self.limit(axes, share, PASSES));
         clock.time("couple", || carry_lattice(&mut self.local, &skin));
         clock.time("crease", || self.separate(axes, share));
         self.iterations += 1;
         self.clock = clock;
     }
 
-    fn project_lattice(&mut self) {
+    fn project_lattice(&mut self, untangles: bool) {
         let (settings, local, kernel) = (self.settings, &mut self.local, self.kernel);
         let region = &local.region;
         if settings.stretch > 0.0 {
@@ -180,7 +178,7 @@ impl Frame<'_> {
         if flesh.volume_compliance.is_some() || flesh.energy_compliance.is_some() {
             project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
         }
-        if settings.volume > 0.0 {
+        if settings.volume > 0.0 && untangles {
             untangle(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
         }
     }
@@ -192,8 +190,9 @@ impl Frame<'_> {
         }
     }
 
-    /// Bind, planes and membranes of every joint.
-    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
+    /// Bind, planes and membranes of every joint. Returns the skin of the membranes.
+    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) -> Vec<u32> {
+        let mut membranes = Vec::new();
         for (k, active) in self.active.iter().enumerate() {
             let region = Arc::clone(&self.local.region);
             let members = &region.free[k];
@@ -202,9 +201,10 @@ impl Frame<'_> {
             }
             if let Some(crease) = self.crease(k, &axes[k], share, members) {
                 crease.separate(&mut self.local);
-                crease.relax(&mut self.local, &self.prepared.rest, passes);
+                membranes.extend(crease.relax(&mut self.local, &self.prepared.rest, passes));
             }
         }
+        membranes
     }
 
     /// Planes alone.
@@ -236,24 +236,31 @@ impl Frame<'_> {
     fn finish(&mut self, pose: &[DAffine3], quality: Quality) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
-        clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        let membranes = clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        let suspects = match quality {
+            Quality::Live => self.triangles_of(membranes),
+            Quality::Bake => (0..self.local.triangles.len() as u32).collect(),
+        };
         if self.settings.volume > 0.0 {
             clock.time("project", || {
                 let local = &mut self.local;
-                untangle(self.kernel, &local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, UNTANGLING);
+                untangle(self.kernel, &local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, quality.untangling());
             });
         }
-        let (mut parted, mut left) = clock.time("contact", || self.part());
+        let (mut parted, mut left) = clock.time("contact", || self.part(&suspects));
         for _ in 0..quality.balloons() {
             clock.time("balloon", || {
                 (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
             });
-            let (more, pairs) = clock.time("contact", || self.part());
+            let (more, pairs) = clock.time("contact", || self.part(&suspects));
             left = pairs;
             if more.is_empty() {
                 break;
             }
             parted.extend(more);
+        }
+        if self.prepared.surface.islands > 1 && self.settings.self_collision {
+            left = clock.time("contact", || self.pairs(&self.places()).len());
         }
         clock.time("contact", || self.undo_harm(pose, &axes, left));
         self.clock = clock;
@@ -315,13 +322,23 @@ impl Frame<'_> {
         }
     }
 
+    /// The triangles that may fold: those of the membranes, and all of joints that have none.
+    fn triangles_of(&self, membranes: Vec<u32>) -> Vec<u32> {
+        let mut may_fold = vec![false; self.local.particles.len()];
+        let bare = self.active.iter().zip(&self.local.free).filter(|(active, _)| !active.joint.is_limb);
+        let particles = bare.flat_map(|(_, members)| members).map(|member| member.particle).chain(membranes);
+        particles.for_each(|p| may_fold[p as usize] = true);
+        let count = self.local.triangles.len() as u32;
+        (0..count).filter(|&t| self.local.triangles[t as usize].iter().any(|&p| may_fold[p as usize])).collect()
+    }
+
     /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
-    fn part(&mut self) -> (Vec<u32>, usize) {
+    fn part(&mut self, suspects: &[u32]) -> (Vec<u32>, usize) {
         if !self.settings.self_collision {
             return (Vec::new(), 0);
         }
         let mut places = self.places();
-        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, FARTHEST);
+        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();

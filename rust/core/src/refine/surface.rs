@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::morton::morton;
+use crate::adjacency::DisjointSets;
 use crate::mesh::TriMesh;
 use crate::weld::Weld;
 
@@ -22,6 +23,9 @@ pub(super) struct Surface {
     pub(super) source: Vec<u32>,
     /// Triangles over welded vertices, by their smallest one; those that name one twice are dropped.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The connected component of each welded vertex, and how many there are.
+    pub(super) island: Vec<u32>,
+    pub(super) islands: usize,
     /// Neighbours along edges, compressed by vertex, ascending.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -39,7 +43,10 @@ impl Surface {
         triangles.sort_by_key(|t| t[0].min(t[1]).min(t[2]));
         let edges = edges_of(&triangles);
         let (starts, neighbours) = rings(&edges, source.len());
-        Self { rest, of_vertex, source, triangles, starts, neighbours, edges }
+        let mut sets = DisjointSets::new(source.len());
+        edges.iter().for_each(|&[i, j]| sets.union(i, j));
+        let (island, islands) = sets.number(|i| starts[i as usize] < starts[i as usize + 1]);
+        Self { rest, of_vertex, source, triangles, island, islands, starts, neighbours, edges }
     }
 
     pub(super) fn len(&self) -> usize {
