@@ -14,12 +14,14 @@ mod frame;
 mod joints;
 mod lattice;
 mod local;
+mod morton;
 mod node_weights;
 pub mod number;
 mod pairs;
 mod predictor;
 mod prepared;
 pub mod projection;
+mod region;
 mod report;
 mod settings;
 mod skeleton;
@@ -28,7 +30,6 @@ mod surface;
 
 use glam::{DAffine3, Vec3};
 
-use self::contact::Skin;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 use self::projection::Kernel;
@@ -173,14 +174,10 @@ impl Refiner {
     /// Limb against limb, limb against torso: over the whole skin, once more.
     fn part_limbs(&self, positions: &mut [[f32; 3]]) {
         let surface = &self.prepared.surface;
-        let skin = Skin {
-            triangles: &surface.triangles,
-            names: &|t| t,
-            ring: &|i| surface.ring(i as usize),
-            is_free: &|_| true,
-        };
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
-        if self.prepared.contact.part(&skin, &mut places).is_empty() {
+        let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
