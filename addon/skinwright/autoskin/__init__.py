@@ -14,6 +14,7 @@ from ..declared import native_keywords
 from ..reporting import AutoskinReport, SkinnedMesh
 from ..scene import armature, mesh, object_state, sculpting, vertex_groups
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from .params import AutoskinParams
 
 __all__ = ["AutoskinParams", "automatic_weights", "steps"]
@@ -48,9 +49,9 @@ def steps(
 ) -> jobs.Jobs[AutoskinReport]:
     """The same in steps: all are computed before the first is written, and all are written or none."""
     rigs = [_rig_of(obj, rig) for obj in objects]
-    answers = []
+    seen, answers = Watched([*objects, *rigs]), []
     for obj, its_rig in zip(objects, rigs, strict=True):
-        answers.append((yield from _compute(obj, its_rig, params)))
+        answers.append((yield from seen.during(_compute(obj, its_rig, params))))
     if before_write:
         before_write(objects)
     with object_state.all_or_nothing(objects):
@@ -67,6 +68,7 @@ def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Ob
         )
     if not armature.deform_bones(rig):
         raise SceneError(f"{rig.name} has no bone that deforms {obj.name}: turn Deform on for some")
+    mesh.check_world(obj, rig)
     return rig
 
 

@@ -108,14 +108,14 @@ def is_posed(armature: bpy.types.Object) -> bool:
 
 
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
-    """Let the armatures that deform `source` deform `obj` in the same way: by modifiers of the same settings.
+    """Let what deforms `source`, or `source` if it is an armature, deform `obj`: by modifiers of the same settings.
 
     They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
     """
     mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
     place = mirrors[-1] + 1 if mirrors else 0
     models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
-    for rig in [m.object for m in models] or [find(source)]:
+    for rig in [m.object for m in models] or [source if source.type == "ARMATURE" else find(source)]:
         modifier = obj.modifiers.new(rig.name, "ARMATURE")
         modifier.object = rig
         obj.modifiers.move(len(obj.modifiers) - 1, place)
