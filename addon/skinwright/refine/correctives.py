@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .. import jobs, native
 from ..scene import driven_keys
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from . import character as characters
 from .character import Character
 from .drivers import CHANNELS, expression
@@ -90,6 +91,7 @@ def steps(
     """
     driven_keys.check(obj)
     character = characters.read(obj)
+    seen = Watched([obj, bpy.data.objects[character.rig]])
     bones = joints(character, chosen or set())
     if not bones:
         raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
@@ -97,6 +99,7 @@ def steps(
     poses = samples(bones, params)
     tasks = [lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses]
     solved = yield Solving(tasks)
+    seen.check()
     report = CorrectiveReport(obj.name, character.rig)
     kept = [(key, certificate) for key, certificate in solved if key is not None]
     for key, _ in kept:
