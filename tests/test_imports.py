@@ -12,7 +12,7 @@ ADDON, CORE = ROOT / "addon" / "skinwright", ROOT / "rust" / "core" / "src"
 
 # From the ground up; a part imports only from floors below its own, and on its own floor what the next line allows.
 ADDON_FLOORS = [
-    {"csr", "errors", "registration"},
+    {"csr", "errors", "registration", "translations"},
     {"declared", "files", "memory", "reporting", "soundness"},
     {"native"},
     {"jobs", "scene"},
