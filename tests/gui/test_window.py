@@ -17,6 +17,11 @@ def test_long_work_shows_progress_and_esc_stops_it(blender):
     assert max(blender.run("long_work", size=(1100, 800))["progress"]) > 0
 
 
+def test_automatic_weights_show_progress_and_are_one_undo_step(blender):
+    seen = blender.run("automatic_weights", timeout=300, size=(1100, 800))
+    assert max(seen["progress"]) > 0 and seen["groups"] > 2
+
+
 def test_a_check_shows_the_offenders_and_the_worst_pose(blender):
     assert blender.run("check_weights", timeout=300, size=(1100, 900))["worst"]
 

@@ -1,5 +1,8 @@
 """Automatic weights through the native module: against SciPy's solution of the same equation, and on real files."""
 
+import os
+from pathlib import Path
+
 import glb
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ import scipy.sparse.linalg as sla
 import skinwright_native as native
 from doll import cylinder
 
+ROOT = Path(__file__).resolve().parents[2]
 METHODS = ("heat", "geodesic", "euclidean")
 
 
@@ -140,30 +144,42 @@ def bones_of(mesh: glb.SkinnedMesh) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([middles, middles + np.array([0, size, 0])], axis=1), np.full(len(middles), -1)
 
 
-FILES = (
-    "mh_male/body.glb",
-    "q_female_peasant/body_unfitted.glb",
-    "q_female_peasant/outfit_split.glb",
-    "q_male_peasant/outfit_split.glb",
-    "qm_men/Beach.glb",
-    "qm_women/SciFi.glb",
-    "animals/ShibaInu.glb",
-    "animals/Deer.glb",
-    "interop/Fox.glb",
-    "interop/CesiumMan.glb",
-)
+def files() -> list[str]:
+    """Every file of the shared data, or none."""
+    folder = Path(os.environ.get("SKINWRIGHT_DATA", ROOT.parent / "shared" / "data"))
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*.glb"))
 
 
-@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("file", files())
 def test_every_vertex_of_real_files_gets_weights(file):
-    """Bodies of many islands, split seams, overlapping parts."""
-    path = glb.data_folder() / file
-    if not path.is_file():
-        pytest.skip(f"there is no {file}")
-    meshes = [mesh for mesh in glb.read_meshes(path) if mesh.weights is not None]
+    """Bodies of many islands, overlapping parts, garments; and each as a soup of triangles that share no vertex."""
+    meshes = [mesh for mesh in glb.read_meshes(glb.data_folder() / file) if mesh.weights is not None]
+    if not meshes:
+        pytest.skip(f"{file} has no skinned mesh")
     mesh = glb.joined(meshes)
     segments, parents = bones_of(mesh)
+    found = {}
     for method in METHODS:
-        assert_sound(
-            native.automatic_weights(mesh.positions, mesh.triangles, segments, parents, method=method, resolution=64)
+        found[method] = native.automatic_weights(
+            mesh.positions, mesh.triangles, segments, parents, method=method, resolution=64
         )
+        assert_sound(found[method])
+    corners = mesh.triangles.ravel()
+    soup = native.automatic_weights(
+        mesh.positions[corners], np.arange(len(corners)).reshape(-1, 3), segments, parents, resolution=64
+    )
+    assert_sound(soup)
+    used = np.unique(corners)
+    if len(np.unique(mesh.positions, axis=0)) == len(mesh.positions) == len(used):
+        off = 0.5 * np.abs(soup.weights.to_dense() - found["heat"].weights.to_dense()[corners]).sum(axis=1)
+        assert np.percentile(off, 99) < 1e-3
+
+
+def test_triangles_at_random_get_weights():
+    """A soup that is no surface at all: shards in and around the bones."""
+    random = np.random.default_rng(3)
+    middles = random.uniform([-0.6, -0.6, 0], [0.6, 0.6, 4], (400, 1, 3))
+    positions = (middles + random.normal(0, 0.08, (400, 3, 3))).reshape(-1, 3).astype(np.float32)
+    triangles = np.arange(1200).reshape(-1, 3)
+    for method in METHODS:
+        assert_sound(native.automatic_weights(positions, triangles, *chain(), method=method, resolution=48))

@@ -79,7 +79,7 @@ def steps(
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
     seen = Watched([source, *targets])
-    embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
+    embedding = yield native.start_embedding(targets[0].name, (positions, triangles), arrays, donor, **options)
     seen.check()
     return _write(context, source, list(targets), bones, embedding, params)
 
