@@ -117,7 +117,10 @@ fn frames(pools: &[ThreadPool; 2]) {
             }
         }
         let [one, two] = times.map(|times| times.medians());
-        println!("  1 thread {:.1} ms wall, {:.1} CPU; 2 threads {:.1} wall, {:.1} CPU", one[0], one[1], two[0], two[1]);
+        println!(
+            "  1 thread {:.1} ms wall, {:.1} CPU; 2 threads {:.1} wall, {:.1} CPU",
+            one[0], one[1], two[0], two[1]
+        );
         let stages: Vec<String> = pools[0].install(|| {
             let (_, report) = refiner.solve_with_report(&bent(119.0), quality, Kernel::Lanes).unwrap();
             report.stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect()

@@ -94,8 +94,7 @@ fn lanes_on_any_number_of_threads_have_the_bits_of_the_scalar_twin() {
         let edges = Batch::new(blocks, &of_twos, &all, |k| twos[k as usize], |_| [0.3]);
         let tetrahedra = Batch::new(blocks, &of_fours, &all, |k| fours[k as usize], |_| []);
         let mut multipliers = (Multipliers::new(edges.len()), Multipliers::new(tetrahedra.len()));
-        let flesh =
-            Flesh { volume: 0.02, arm: 0.3, volume_compliance: Some(0.0005), energy_compliance: Some(2.0) };
+        let flesh = Flesh { volume: 0.02, arm: 0.3, volume_compliance: Some(0.0005), energy_compliance: Some(2.0) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             for _ in 0..3 {

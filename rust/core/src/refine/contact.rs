@@ -9,10 +9,11 @@ use super::pairs::{intersecting_pairs, intersecting_pairs_of};
 use super::region::Region;
 use super::surface::Surface;
 
-/// Rounds of pushing.
-const ROUNDS: usize = 60;
-/// Rounds without fewer pairs after which more skin around is smoothed.
-const PATIENCE: usize = 3;
+/// Rounds of pushing without fewer pairs, after which another width is tried.
+const STALLED: usize = 5;
+/// How many rings around are smoothed, in the order they are tried: a fold is wider than it looks, and skin that is
+/// pressed against what may not move gets worse by smoothing.
+const WIDTHS: [usize; 5] = [1, 0, 2, 3, 4];
 /// The widest smoothing, as a share of how far skin may move: edges of coarse skin are longer, and a ring of them is a limb.
 const WIDEST: f32 = 1.4;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
@@ -131,29 +132,32 @@ impl Contact {
         let among: Vec<u32> = (0..skin.triangles().len() as u32)
             .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
             .collect();
-        let (start, mut now) = (places.clone(), places.clone());
-        let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().clamp(1.0, 4.0) as usize;
-        let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
-        for _ in 0..ROUNDS {
-            let pushed = push(skin, &mut now, &pairs, (1 + stalled / PATIENCE).min(most_rings));
-            for &i in &pushed {
-                let from = start[i as usize];
-                now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
-            }
-            moved.extend(pushed);
-            pairs = self.own_pairs(skin, &now, &among);
-            stalled += 1;
-            if pairs.len() < fewest {
-                (fewest, stalled) = (pairs.len(), 0);
-                places.clone_from(&now);
-            }
-            if pairs.is_empty() || stalled == PATIENCE * most_rings + 2 {
-                break;
+        let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().max(1.0) as usize;
+        let (start, mut moved) = (places.clone(), Vec::new());
+        for rings in WIDTHS.into_iter().filter(|&rings| rings <= most_rings) {
+            let (mut now, mut left, mut stalled) = (places.clone(), pairs.clone(), 0);
+            while stalled < STALLED && !pairs.is_empty() {
+                let pushed = push(skin, &mut now, &left, rings);
+                for &i in &pushed {
+                    let from = start[i as usize];
+                    now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
+                }
+                moved.extend(pushed);
+                left = self.own_pairs(skin, &now, &among);
+                stalled += 1;
+                if left.len() < pairs.len() {
+                    stalled = 0;
+                    pairs.clone_from(&left);
+                    places.clone_from(&now);
+                }
+                if left.is_empty() {
+                    break;
+                }
             }
         }
         moved.sort_unstable();
         moved.dedup();
-        (moved, fewest)
+        (moved, pairs.len())
     }
 }
 

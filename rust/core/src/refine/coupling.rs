@@ -55,11 +55,7 @@ pub(super) fn carry_lattice(local: &mut Local, before: &[Particle]) {
 const RUN: usize = 2048;
 
 /// Moves each of `members` (ascending) by what `by` says of its place, if it is free.
-pub(super) fn shift_members(
-    particles: &mut [Particle],
-    members: &[Member],
-    by: impl Fn(Vec3, &Member) -> Vec3 + Sync,
-) {
+pub(super) fn shift_members(particles: &mut [Particle], members: &[Member], by: impl Fn(Vec3, &Member) -> Vec3 + Sync) {
     let of_run = |(run, particles): (usize, &mut [Particle])| {
         let first = run * RUN;
         let from = members.partition_point(|m| (m.particle as usize) < first);

@@ -28,7 +28,7 @@ mod skeleton;
 mod solver;
 mod surface;
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
@@ -40,6 +40,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
+
+/// What keeping limbs apart may cost of the volume.
+const MOST_LOST: f64 = 0.02;
 
 /// A character prepared for refinement: any number of poses, in any order.
 ///
@@ -177,7 +180,12 @@ impl Refiner {
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
         let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        let before = self.lost(&places);
         if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
+            return;
+        }
+        // Layers of cloth can be smoothed away; they had better pass through each other.
+        if self.lost(&places) > before.max(MOST_LOST) {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
@@ -186,6 +194,16 @@ impl Refiner {
                 *position = at.to_array();
             }
         }
+    }
+
+    /// By how much the volume of the skin at `places` (welded) differs from rest, as a share.
+    fn lost(&self, places: &[Vec3]) -> f64 {
+        let surface = &self.prepared.surface;
+        let volume = |at: &dyn Fn(u32) -> DVec3| -> f64 {
+            surface.triangles.iter().map(|t| t.map(at)).map(|[a, b, c]| a.dot(b.cross(c))).sum()
+        };
+        let now = volume(&|i| places[i as usize].as_dvec3());
+        (now / volume(&|i| surface.rest[i as usize]) - 1.0).abs()
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.

@@ -47,11 +47,7 @@ impl Bounds {
 /// The same among some triangles, which are fast to compare where neighbours in the list lie near each other.
 ///
 /// Boxes are joined by eights, and those by eights again. Each group of eight looks for others that overlap.
-pub(super) fn intersecting_pairs_of(
-    places: &[Vec3],
-    triangles: &[[u32; 3]],
-    among: &[u32],
-) -> Vec<[u32; 2]> {
+pub(super) fn intersecting_pairs_of(places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Vec<[u32; 2]> {
     let bounds = |&triangle: &u32| {
         let [a, b, c] = triangles[triangle as usize].map(|i| Vec3A::from(places[i as usize]));
         Bounds { low: a.min(b).min(c), high: a.max(b).max(c), triangle }

@@ -4,10 +4,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
-use super::contact::Skin;
 use super::projection::{Batch, Blocks};
 
 const NONE: u32 = u32::MAX;

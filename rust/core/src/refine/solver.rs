@@ -10,12 +10,11 @@ use super::constraint::Axis;
 use super::coupling::{carry_lattice, carry_skin, place};
 use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
-use super::local::Local;
 use super::joints::Member;
+use super::local::Local;
 use super::predictor::{follow, linear, place_all, place_bound, skinned};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
 use super::projection::{Flesh, Kernel, Stretch, project, untangle};
-use super::region::Region;
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -218,13 +217,7 @@ impl Frame<'_> {
         }
     }
 
-    fn crease<'m>(
-        &self,
-        k: usize,
-        axis: &Axis,
-        share: f32,
-        members: &'m [Member],
-    ) -> Option<Crease<'m>> {
+    fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
         if !self.settings.self_collision {
             return None;
         }
@@ -244,7 +237,15 @@ impl Frame<'_> {
         if self.settings.volume > 0.0 {
             clock.time("project", || {
                 let local = &mut self.local;
-                untangle(self.kernel, &local.region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.05, 0.3], 8, quality.untangling());
+                untangle(
+                    self.kernel,
+                    &local.region.tetrahedra,
+                    TETRAHEDRON,
+                    &mut local.particles,
+                    [0.05, 0.3],
+                    8,
+                    quality.untangling(),
+                );
             });
         }
         let (mut parted, mut left) = clock.time("contact", || self.part(&suspects));
@@ -270,7 +271,8 @@ impl Frame<'_> {
     /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
     fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
         let all = 0..self.active.len();
-        let lost = |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
+        let lost =
+            |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
         let solved = self.places();
         let suspects: Vec<usize> = all.clone().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
         if suspects.is_empty() && left == 0 {
@@ -387,11 +389,8 @@ impl Frame<'_> {
         let before = skinned(self.prepared, &self.local, pose);
         let joints = (0..self.active.len()).map(|k| self.joint_report(k, path, pose, &axes[k], &before)).collect();
         let local = &self.local;
-        let constraints = [
-            local.edges.len() + local.sides.len(),
-            local.tetrahedra.len() * 2,
-            local.free.iter().map(Vec::len).sum(),
-        ];
+        let constraints =
+            [local.edges.len() + local.sides.len(), local.tetrahedra.len() * 2, local.free.iter().map(Vec::len).sum()];
         Report {
             joints,
             active_tetrahedra: local.tetrahedra.len(),

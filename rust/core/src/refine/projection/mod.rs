@@ -128,7 +128,7 @@ impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_,
 
     #[inline(always)]
     fn eights<R: Register>(self, proof: R::Proof) {
-        let Self { block, first, part: Part { kind, batch, mut multipliers, particles, base, .. } } = self;
+        let Self { block, first, part: Part { kind, batch, multipliers, particles, base, .. } } = self;
         let span = batch.spans[block];
         let mut from = span.from;
         for run in span.runs.0..span.runs.1 {
