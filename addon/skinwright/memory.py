@@ -41,7 +41,7 @@ def free_bytes() -> int | None:
 
 
 def _linux() -> int | None:
-    for line in Path("/proc/meminfo").read_text().splitlines():
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) * 1024
     return None

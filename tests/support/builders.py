@@ -104,3 +104,9 @@ def select(*objects: bpy.types.Object) -> None:
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
     bpy.context.view_layer.objects.active = objects[-1] if objects else None
+
+
+def select_bone(armature: bpy.types.Object, name: str, chosen: bool) -> None:
+    """Select a bone or not; the flag moved to the pose bone in Blender 5.0."""
+    owner = armature.pose.bones[name] if bpy.app.version >= (5, 0, 0) else armature.data.bones[name]
+    owner.select = chosen

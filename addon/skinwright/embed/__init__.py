@@ -63,6 +63,7 @@ def steps(
     context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: EmbedParams
 ) -> Jobs[EmbedReport]:
     """The same, job by job. Nothing is made before all is computed."""
+    source = _rig_of(source)
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
@@ -77,6 +78,14 @@ def steps(
     embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
     seen.check()
     return _write(context, source, list(targets), bones, embedding, params)
+
+
+def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
+    """The armature that is meant: the object itself, or the one that deforms it."""
+    rig = source if source.type == "ARMATURE" else armature.find(source)
+    if rig is None:
+        raise SceneError(f"{source.name} is no armature and has none: pick the armature of another character")
+    return rig
 
 
 def _donor(
@@ -123,7 +132,7 @@ def _write(
             embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
             for obj in targets if params.bind else ():
                 if armature.find(obj) is None:
-                    armature.attach(obj, rig)
+                    armature.bind(obj, rig)
             return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
     except BaseException:
         embedded.remove(rig)

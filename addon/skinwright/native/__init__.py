@@ -45,7 +45,9 @@ def problem() -> str:
 @cache
 def addon_version() -> str:
     """The version in the manifest."""
-    return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
+    return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text(encoding="utf-8"))[
+        "version"
+    ]
 
 
 def _set_budget() -> None:

@@ -9,7 +9,7 @@ from ..declared import Params, max_influences, setting, threads
 
 Method = Literal["skeleton", "biharmonic"]
 MatchPoints = Literal["surface", "vertices"]
-# Source object and vertex, target object and vertex.
+# Source object and vertex, target object and vertex; an empty stands for the vertex nearest to it.
 Landmark = tuple[str, int, str, int]
 
 

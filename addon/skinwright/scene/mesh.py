@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import bmesh
@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from . import faces
 from .error import SceneError
 
 
@@ -18,12 +19,13 @@ from .error import SceneError
 class Geometry:
     """positions (V, 3) f32 in world units, triangles (T, 3) u32 whose winding gives outward normals in the world.
 
-    `wires` (E, 2) u32 are the edges of no face.
+    `wires` (E, 2) u32 are the edges of no face, `quads` those faces that are convex quads.
     """
 
     positions: NDArray[np.float32]
     triangles: NDArray[np.uint32]
     wires: NDArray[np.uint32]
+    quads: faces.Quads = field(default_factory=faces.no_quads)
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -48,14 +50,17 @@ def read(obj: bpy.types.Object) -> Geometry:
 
 def placed(obj: bpy.types.Object, matrix: Matrix, local: NDArray[np.float32], shape: bpy.types.Mesh) -> Geometry:
     """Local positions (V, 3) of `obj`, in the world that its `matrix` leads to, with the faces and wires of `shape`."""
-    triangle = triangles_of(obj, shape)
+    _check_connected(obj, shape)
     world = np.array(matrix, dtype=np.float64)
-    if _checked_determinant(obj, world) < 0:
-        triangle = triangle[:, ::-1]
+    is_mirrored = _checked_determinant(obj, world) < 0
     with np.errstate(all="ignore"):  # numbers that are not finite are looked for next
         positions = transformed(local, world)
     _check_finite(obj, positions)
-    return Geometry(positions, np.ascontiguousarray(triangle), wires_of(shape))
+    triangles, quads = faces.triangulated(shape, positions)
+    if is_mirrored:
+        triangles = np.ascontiguousarray(triangles[:, ::-1])
+        quads = faces.Quads(np.ascontiguousarray(quads.corners[:, ::-1]), quads.first)
+    return Geometry(positions, triangles, wires_of(shape), quads)
 
 
 def transformed(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -214,24 +219,12 @@ def triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:
     """(T, 3) of its faces as they are, before modifiers. Raises SceneError if there are none."""
     if not obj.data.polygons:
         raise SceneError(f"{obj.name} has no faces: this works along surfaces, so give it some")
-    return triangles_of(obj, obj.data)
+    return faces.blenders_triangles(obj.data)
 
 
-def triangles_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> NDArray[np.uint32]:
-    """(T, 3) of a mesh of the object: its own, or one that its modifiers leave."""
+def _check_connected(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
     if not mesh.polygons and not mesh.edges:
         raise SceneError(f"{obj.name} has no faces and no edges: weights are carried over them, so give it some")
-    if not mesh.polygons:
-        return np.empty((0, 3), np.uint32)
-    corners = mesh.attributes.get(".corner_vert")  # not there in Edit mode
-    if corners and len(mesh.loops) == 3 * len(mesh.polygons):  # triangles only: these are read a hundred times as fast
-        triangle = np.empty(len(mesh.loops), np.int32)
-        corners.data.foreach_get("value", triangle)
-    else:
-        mesh.calc_loop_triangles()
-        triangle = np.empty(len(mesh.loop_triangles) * 3, np.int32)
-        mesh.loop_triangles.foreach_get("vertices", triangle)
-    return triangle.reshape(-1, 3).astype(np.uint32)
 
 
 def wires_of(mesh: bpy.types.Mesh) -> NDArray[np.uint32]:

@@ -1,6 +1,7 @@
 """What a transfer reads from the source: one mesh, or several that are one body."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -42,6 +43,13 @@ class Body:
     def is_partial(self) -> bool:
         """Whether only some of its bones are written."""
         return not set(self.bones) <= self.chosen
+
+    @cached_property
+    def flaws(self) -> dict[str, int]:
+        """Vertices without weights of bones, and with weights that do not sum to 1 (to 1e-3), by the report's names."""
+        sums = csr.row_sums(self.bone_weights)
+        off = np.abs(np.divide(1, sums, out=np.ones_like(sums), where=sums > 0) - 1) > 1e-3
+        return {"source_unweighted": int((sums <= 0).sum()), "source_unnormalised": int(off.sum())}
 
     @property
     def name(self) -> str:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from .. import csr, native
 from ..csr import Rows
 from ..jobs import Jobs
-from ..scene.mesh import Geometry
-from . import completion, merging, parts, scalar_fields
+from . import completion, fans, merging, parts, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
 from .prepared import Prepared
@@ -91,8 +90,7 @@ def prepare(source: native.Source, garment: Garment, params: TransferParams) -> 
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
-    geometry: Geometry = body.geometry
-    return native.Source(body.name, geometry.positions, geometry.triangles, rows, n_columns)
+    return native.Source(body.name, *fans.surface(body.geometry), fans.rows(rows, body.geometry.quads), n_columns)
 
 
 def _compute_group(
@@ -120,7 +118,7 @@ def _compute_group(
     if packed is not None:
         if with_bones:
             # Points and factorisations are those of the bones: only the solve is done again.
-            prepared.set_source_weights(packed, len(body.fields) + 1)
+            prepared.set_source_weights(fans.rows(packed, body.geometry.quads), len(body.fields) + 1)
         of_fields, field_rows = yield from _field_rows(prepared, body, params)
         answers = answers or of_fields
         rows = [csr.beside(left, len(body.fields), right) for left, right in zip(field_rows, rows, strict=True)]
@@ -144,7 +142,9 @@ def to_result(body: Body, garment: Garment, answer: Answer, names: list[str], ro
     # A vertex without a row is one the policy for islands leaves alone.
     written = answer.has_row & garment.writable
     names = [name for name, kept in zip(names, wanted, strict=True) if kept]
-    return Result(answer.matched, answer.report, names, csr.take_columns(rows, wanted), written, seconds)
+    # The library has counted the centres of quads too.
+    report = answer.report | (body.flaws if body.bones else {})
+    return Result(answer.matched, report, names, csr.take_columns(rows, wanted), written, seconds)
 
 
 def bone_rows(prepared: Prepared, garment: Garment, params: TransferParams) -> Jobs[tuple[Answer, Rows]]:

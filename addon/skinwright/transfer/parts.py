@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
+from ..scene.faces import Quads
 from ..scene.mesh import Geometry
 from ..scene.places import coincident, numbers
 
@@ -76,10 +77,16 @@ def united(geometries: Sequence[Geometry]) -> Geometry:
         return geometries[0]
     starts = np.cumsum([0, *(len(geometry.positions) for geometry in geometries)], dtype=np.int64)
     placed = list(zip(geometries, starts, strict=False))
+    counts = np.cumsum([0, *(len(geometry.triangles) for geometry in geometries)], dtype=np.int64)
+    quads = [geometry.quads for geometry in geometries]
     return Geometry(
         np.concatenate([geometry.positions for geometry in geometries]),
         np.concatenate([geometry.triangles + np.uint32(start) for geometry, start in placed]),
         np.concatenate([geometry.wires + np.uint32(start) for geometry, start in placed]),
+        Quads(
+            np.concatenate([each.corners + np.uint32(start) for each, start in zip(quads, starts, strict=False)]),
+            np.concatenate([each.first + count for each, count in zip(quads, counts, strict=False)]),
+        ),
     )
 
 

@@ -81,6 +81,22 @@ pub struct AutoWeights {
 ///
 /// # Errors
 /// [`Error::InvalidSkeleton`], [`Error::InvalidParameter`], [`Error::Cancelled`], [`Error::NotPositiveDefinite`].
+///
+/// # Example
+/// ```
+/// use skinwright_core::autoskin::{Settings, Skeleton, automatic_weights};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (positions, triangles) = mesh(data("arm.obj"))?;
+/// let arm = TriMesh::new(&positions, &triangles, "arm")?;
+/// let segments = [[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+/// let skeleton = Skeleton { segments: &segments, parents: &[-1, 0] };
+/// let automatic = automatic_weights(&arm, &skeleton, &Settings::default(), &Progress::default())?;
+/// assert_eq!(automatic.report.unweighted, 0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn automatic_weights(
     mesh: &TriMesh<'_>,
     skeleton: &Skeleton<'_>,

@@ -41,6 +41,28 @@ use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
 
 /// A character prepared for refinement: any number of poses, in any order.
+///
+/// # Example
+/// An elbow bent by 120 degrees:
+/// ```
+/// use glam::{DAffine3, DQuat, DVec3};
+/// use skinwright_core::refine::{Quality, Refiner, Settings};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (positions, triangles) = mesh(data("arm.obj"))?;
+/// # let painted = weights(data("arm.weights"), positions.len())?;
+/// let arm = TriMesh::new(&positions, &triangles, "arm")?;
+/// let segments = [[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+/// let settings = Settings { cell: Some(0.03), ..Settings::default() };
+/// let refiner = Refiner::new(&arm, &painted, &[-1, 0], &segments, settings, &Progress::default())?;
+/// let elbow = DAffine3::from_translation(DVec3::new(0.5, 0.0, 0.0));
+/// let bend = elbow * DAffine3::from_quat(DQuat::from_rotation_z(120f64.to_radians())) * elbow.inverse();
+/// let refined = refiner.solve(&[DAffine3::IDENTITY, bend], Quality::Live)?;
+/// assert_eq!(refined.len(), positions.len());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Refiner {
     prepared: Prepared,
