@@ -109,13 +109,13 @@ def is_posed(armature: bpy.types.Object) -> bool:
 
 
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
-    """Let what deforms `source`, or `source` if it is an armature, deform `obj`: by modifiers of the same settings.
+    """Let the armatures that deform `source` deform `obj`: by modifiers of the same settings.
 
     They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
     """
     place = _place_of_first(obj)
     models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
-    for rig in [m.object for m in models] or [source if source.type == "ARMATURE" else find(source)]:
+    for rig in [m.object for m in models] or [find(source)]:
         _add_modifier(obj, rig, place)
         place += 1
     added = [m for m in obj.modifiers if m.type == "ARMATURE"]
