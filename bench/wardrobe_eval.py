@@ -3,8 +3,8 @@
     python bench/wardrobe_eval.py [--jobs 200]
 
 The jobs are real garments on their bodies (`SKINWRIGHT_DATA`), each under several settings. One run does all of them in
-one Blender; another is ended twice by SIGKILL and started again; the third hands single jobs to two Dask workers, one
-of which is ended by SIGKILL on the way. The bytes of all results must agree. Writes bench/wardrobe_results.md.
+one Blender; another is ended twice by SIGKILL and started again; the third hands ten jobs at once to two Dask workers,
+one of which is ended by SIGKILL on the way. The bytes of all results must agree. Writes bench/wardrobe_results.md.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("SKINWRIGHT_DATA", ROOT.parent / "shared" / "data"))
 FOLDER = ROOT / "out" / "wardrobe"
+AT_ONCE = 10
 BODIES = ("mh_female", "mh_male", "q_female_peasant", "q_male_peasant")
 
 
@@ -106,14 +107,14 @@ def with_dask(manifest: Path, jobs: int) -> Run:
     out = FOLDER / "dask"
     script = [sys.executable, str(ROOT / "examples" / "wardrobe_dask.py"), str(manifest), "--out", str(out)]
     with Clock() as clock:
-        process = subprocess.Popen([*script, "--workers", "2"], stdout=subprocess.DEVNULL)
+        process = subprocess.Popen([*script, "--workers", "2", "--at-once", str(AT_ONCE)], stdout=subprocess.DEVNULL)
         while len(list(out.glob("*--*.json"))) < jobs / 3 and process.poll() is None:
             time.sleep(0.02)
         worker = workers(process.pid)[0]
         os.kill(worker, signal.SIGKILL)
         if process.wait():
             raise SystemExit("the run with Dask failed")
-    return Run("two Dask workers, one killed", clock.wall, clock.cpu, jobs, digest(out))
+    return Run("two Dask workers, one killed", clock.wall, clock.cpu, -(-jobs // AT_ONCE), digest(out))
 
 
 def workers(scheduler: int) -> list[int]:

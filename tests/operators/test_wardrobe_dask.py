@@ -58,7 +58,7 @@ def test_a_killed_worker_loses_nothing(addon, folder, tmp_path):
     script = str(ROOT / "blender_scripts" / "wardrobe.py")
     wrapper.write_text(COMMAND.format(marker=str(marker), script=script), encoding="utf-8")
     command = [sys.executable, str(ROOT / "examples" / "wardrobe_dask.py"), str(folder), "--out", str(shared)]
-    command += ["--workers", "2", "--command", f"'{sys.executable}' '{wrapper}'"]
+    command += ["--workers", "2", "--at-once", "2", "--command", f"'{sys.executable}' '{wrapper}'"]
     done = subprocess.run(command, capture_output=True, encoding="utf-8", errors="replace", timeout=600, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert marker.exists(), "no worker was killed"
