@@ -236,3 +236,8 @@ monkey: .venv/tests.stamp
 .PHONY: wardrobe-eval
 wardrobe-eval: .venv/tests.stamp
 	$(IN_TIME) 3600 .venv/bin/python bench/wardrobe_eval.py
+
+## make pictures   the manual's pictures, in a real window: SKINWRIGHT_BLENDER_TREES names the Blender
+.PHONY: pictures
+pictures: .venv/tests.stamp
+	.venv/bin/python docs/make_pictures.py
