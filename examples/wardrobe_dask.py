@@ -39,7 +39,9 @@ def main() -> int:
 
 def run_job(name: str, command: list[str]) -> tuple[str, int, str]:
     """One job in a process of its own: what it does to Blender cannot reach the next."""
-    done = subprocess.run([*command, "--job", name], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*command, "--job", name], capture_output=True, encoding="utf-8", errors="replace", check=False
+    )
     return name, done.returncode, done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr[-500:]
 
 

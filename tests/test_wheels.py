@@ -12,7 +12,9 @@ from pathlib import Path
 import platforms
 import pytest
 
-WHEELS = sorted((Path(__file__).resolve().parent.parent / "dist" / "wheels").glob("*.whl"))
+ROOT = Path(__file__).resolve().parent.parent
+WHEELS = sorted((ROOT / "dist" / "wheels").glob("*.whl"))
+STUB = ROOT / "rust" / "native" / "skinwright_native.pyi"
 lief = pytest.importorskip("lief", reason="needs lief to read foreign modules")
 
 ARCHITECTURE = {
@@ -68,11 +70,17 @@ def test_what_is_published_with_it(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         metadata = next(archive.read(name).decode() for name in names if name.endswith("METADATA"))
-    assert any(name.endswith(".pyi") for name in names)
+        stub = archive.read("skinwright_native/__init__.pyi").decode()
+    assert stub == STUB.read_text(encoding="utf-8")
+    assert "skinwright_native/py.typed" in names
     assert any("LICENSE" in name for name in names)
     assert "Requires-Python: >=3.11" in metadata
     assert "Description-Content-Type: text/markdown" in metadata
     assert "Classifier: " in metadata
+
+
+def test_no_folder_of_the_builder_is_inside(module):
+    assert not re.findall(rb"/(?:root|home|work|Users|checkout)/[\w.-]*", module)
 
 
 def test_the_architecture(platform, module):

@@ -1,11 +1,11 @@
 """Skinwright: transfer skin weights, steer the transfer with a mask, turn sculpts into weights."""
 
-from . import operators, preferences, settings, ui
+from . import operators, preferences, settings, translations, ui
 from .headless import command_line
 from .overlay import draw
 from .scene import changes
 
-MODULES = (preferences, settings, changes, *operators.MODULES, *ui.MODULES, draw, command_line)
+MODULES = (translations, preferences, settings, changes, *operators.MODULES, *ui.MODULES, draw, command_line)
 
 
 def register() -> None:

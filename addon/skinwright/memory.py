@@ -4,6 +4,31 @@ import ctypes
 import sys
 from pathlib import Path
 
+from .errors import Refused
+
+# The part of the free memory that one piece of work may take; the preferences set it.
+share = 0.5
+
+
+class TooLarge(Refused):
+    """Work that would take more memory than it may."""
+
+
+def budget() -> int | None:
+    """Bytes that one piece of work may take now."""
+    free = free_bytes()
+    return None if free is None else int(free * share)
+
+
+def expect(work: str, size: int) -> None:
+    """Raise TooLarge with the estimate if `work` would take more than its share of `size` bytes."""
+    allowed = budget()
+    if allowed is not None and size > allowed:
+        raise TooLarge(
+            f"{work} would take about {size >> 20} MiB of memory, and {allowed >> 20} are allowed: "
+            "do less at once, close other programs, or allow more in the preferences"
+        )
+
 
 def free_bytes() -> int | None:
     """Bytes that can be had without swapping."""
@@ -16,7 +41,7 @@ def free_bytes() -> int | None:
 
 
 def _linux() -> int | None:
-    for line in Path("/proc/meminfo").read_text().splitlines():
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) * 1024
     return None

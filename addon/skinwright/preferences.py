@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from bpy.types import AddonPreferences, Context
 
-from . import declared, native
+from . import declared, memory, native
 from .registration import registration
 from .settings.properties import properties
 
@@ -16,7 +16,7 @@ class Preferences(declared.Params):
 
     threads: int = declared.threads()
     memory_share: float = declared.setting(
-        native.memory_share,
+        memory.share,
         "Memory",
         "The part of the free memory that one calculation may take; larger ones are refused with their estimate",
         least=0.05,
@@ -52,7 +52,7 @@ def threads(context: Context) -> int:
     addon = context.preferences.addons.get(__package__)
     if not addon or not addon.preferences:
         return 0
-    native.memory_share = addon.preferences.memory_share
+    memory.share = addon.preferences.memory_share
     return addon.preferences.threads
 
 

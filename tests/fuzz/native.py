@@ -10,11 +10,11 @@ import numpy as np
 import skinwright_native as native
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import characters
+from characters import junk
 from findings import NEVER, Run
 
 ALLOWED = (native.SkinwrightError, TypeError, MemoryError, ValueError, OverflowError)
-NUMBERS = [0, 1, -1, 2, 3, 0.5, 1e-30, 1e30, -1e300, np.nan, np.inf, -np.inf, 1 << 31, 1 << 32, 1 << 63, 10**40, True]
-NUMBERS += [None, "1", [1], {}, 1 + 1j, np.float32(0.25), np.int8(-1)]
 
 
 def soup(rng):
@@ -46,10 +46,6 @@ def weights(rng, n_vertices):
     if rng.random() < 0.1:
         dense[rng.integers(n_vertices), 0] = rng.choice([np.nan, np.inf, -1, 5])
     return native.Weights.from_dense(dense.astype(np.float32))
-
-
-def junk(rng):
-    return NUMBERS[int(rng.integers(len(NUMBERS)))]
 
 
 def settings(rng):
@@ -135,7 +131,7 @@ def arrays(rng):
     native.Weights(rng.integers(-1, 8, n + 1), rng.integers(-1, 5, rng.integers(0, 8)), rng.normal(size=3), junk(rng))
 
 
-CALLS = [transfer, transfer, prepared, desparsify, sculpt, arrays]
+CALLS = [transfer, transfer, prepared, desparsify, sculpt, arrays, *characters.CALLS]
 
 
 def case(call, rng):

@@ -11,15 +11,6 @@ pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
 @pytest.fixture
-def plain(addon):
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
-
-
-@pytest.fixture
 def body(scene):
     return figure.body()
 

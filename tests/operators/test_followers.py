@@ -1,23 +1,17 @@
 """After a transfer a target does what its new weights say, or a sentence names what overrules them."""
 
+from importlib import import_module
+
 import builders
 import figure
 import numpy as np
 import pytest
+from transferring import said
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 from mathutils import Matrix  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
-
-
-@pytest.fixture
-def plain(addon):
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
 
 
 @pytest.fixture
@@ -33,10 +27,6 @@ def rig(body):
 @pytest.fixture
 def boot(body):
     return builders.mesh("Boot", *figure.tube(0.12, 0.05, 0.45, 0.1))
-
-
-def said(report):
-    return " | ".join(report.all_warnings())
 
 
 def astray(obj, rig, before):
@@ -353,6 +343,33 @@ class TestFittedInPose:
         assert figure.shown(fitted) == pytest.approx(before, abs=1e-5)
         wide.value = 0
         assert figure.shown(fitted)[:, 1] == pytest.approx(before[:, 1] - 0.005, abs=1e-5)
+
+    def test_nothing_is_left_if_a_later_target_fails(self, addon, plain, body, rig, fitted, boot, monkeypatch):
+        """Neither the rest shape that was bound, nor what no longer follows the rig by other means."""
+        fitted.shape_key_add(name="Basis", from_mix=False)
+        boot.parent, boot.parent_type, boot.parent_bone = rig, "BONE", "Shin.L"
+        follow = boot.constraints.new("COPY_LOCATION")
+        follow.target, follow.subtarget = rig, "Shin.L"
+        bpy.context.view_layer.update()
+        writing = import_module(f"{addon.__name__}.transfer.write")
+        report, count = writing._report, []
+
+        def fails(*arguments):
+            count.append(1)
+            if len(count) == 2:
+                raise OSError("injected")
+            return report(*arguments)
+
+        monkeypatch.setattr(writing, "_report", fails)
+        before = figure.shown(fitted), figure.rest(fitted), boot.matrix_world.copy()
+        with pytest.raises(OSError, match="injected"):
+            plain(body, fitted, boot, geometry="CURRENT", replace_others=True)
+        bpy.context.view_layer.update()
+        assert np.array_equal(figure.rest(fitted), before[1])
+        assert np.array_equal(figure.shown(fitted), before[0])
+        assert not fitted.vertex_groups and not boot.vertex_groups and not fitted.modifiers
+        assert (boot.parent, boot.parent_bone, follow.mute) == (rig, "Shin.L", False)
+        assert boot.matrix_world == before[2]
 
     def test_one_that_has_the_modifier_but_no_weights_yet(self, plain, body, rig, fitted):
         figure.bind(fitted, rig)

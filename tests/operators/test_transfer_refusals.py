@@ -25,15 +25,6 @@ def coat(body):
     return obj
 
 
-@pytest.fixture
-def plain(addon):
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
-
-
 def state(*objects):
     """All that a transfer might change."""
     return [

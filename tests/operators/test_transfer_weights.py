@@ -30,17 +30,6 @@ def run(**settings):
     assert bpy.ops.skinwright.transfer_weights(**settings) == {"FINISHED"}
 
 
-@pytest.fixture
-def plain(addon):
-    """The plain function with settings by name; gives its report."""
-
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
-
-
 def arrays(obj):
     """World positions and triangles by a way of the test's own."""
     positions = np.array([obj.matrix_world @ v.co for v in obj.data.vertices], np.float32)

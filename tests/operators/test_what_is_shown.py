@@ -4,23 +4,11 @@ import builders
 import figure
 import numpy as np
 import pytest
+from transferring import said
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
-
-
-@pytest.fixture
-def plain(addon):
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
-
-
-def said(report):
-    return " | ".join(report.all_warnings())
 
 
 def wrong_share(obj, truth):

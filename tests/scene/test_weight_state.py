@@ -83,30 +83,6 @@ def test_digests_tell_states_apart(weight_state):
     assert len(seen) == 4
 
 
-@pytest.mark.parametrize("error", [ValueError, MemoryError, KeyboardInterrupt, SystemExit])
-def test_a_block_that_breaks_leaves_no_trace(weight_state, error):
-    rng = np.random.default_rng(2)
-    coat, shared = randomly_painted(rng), builders.grid("Twin", 3)
-    shared.data = coat.data
-    rig = builders.rig()
-    before, mesh, meshes = stored(coat), coat.data, len(bpy.data.meshes)
-    with pytest.raises(error), weight_state.all_or_nothing([coat]):
-        coat.data = coat.data.copy()
-        coat.modifiers.new("Armature", "ARMATURE").object = rig
-        for _ in range(20):
-            edit(coat, rng)
-        raise error
-    assert stored(coat) == before and coat.data == mesh == shared.data
-    assert not coat.modifiers and len(bpy.data.meshes) == meshes
-
-
-def test_a_block_that_ends_well_is_kept(weight_state):
-    coat = randomly_painted(np.random.default_rng(3))
-    with weight_state.all_or_nothing([coat]):
-        coat.vertex_groups[0].add([0], 0.25, "REPLACE")
-    assert builders.weights(coat)[0][coat.vertex_groups[0].name] == 0.25
-
-
 def test_weights_that_are_none_come_back_as_they_were(weight_state):
     """A state is no judge: not-a-number is kept too."""
     obj = builders.grid("Coat", 3)

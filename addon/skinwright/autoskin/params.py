@@ -11,6 +11,11 @@ METHODS: Choices = {
     "geodesic": ("Inside Distance", "Inverse distances to the nearest bones through the inside of the mesh"),
     "euclidean": ("Straight Distance", "Inverse straight distances to the nearest bones; they bleed across gaps"),
 }
+Geometry = Literal["AS_SHOWN", "REST"]
+GEOMETRIES: Choices = {
+    "AS_SHOWN": ("As Shown, in Rest Pose", "The shape with shape keys and modifiers, but not as it is posed"),
+    "REST": ("Rest", "The shape without modifiers, shape keys or pose"),
+}
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,28 @@ class AutoskinParams(Params):
         most=512,
         native=True,
     )
-    selected_bones: bool = setting(False, "Selected Bones", "Only the selected bones; others keep their weights")
+    geometry: Geometry = setting("AS_SHOWN", "Geometry", "Which shape the bones are laid into", choices=GEOMETRIES)
+    join_borders: bool = setting(
+        True, "Join Borders", "Solve meshes whose borders lie on each other as one, so that no gap opens there"
+    )
+    selected_bones: bool = setting(
+        False, "Selected Bones", "Write only the selected bones; the others keep their proportions and make room"
+    )
     selected_only: bool = setting(
-        False, "Selected Vertices", "Only the vertices selected in Edit mode or by the paint mask"
+        False, "Selected Vertices", "Write only the vertices selected in Edit mode or by the paint mask"
+    )
+    mask_group: str = setting(
+        "", "Mask", "Vertex group whose weights say how much of the new weights a vertex takes; empty takes all"
+    )
+    mix_factor: float = setting(
+        1.0, "Mix", "How much of the new weights is taken; the rest are those already there", most=1, unit="FACTOR"
+    )
+    symmetrize: bool = setting(
+        False,
+        "Symmetrize",
+        "Give vertices that mirror each other across the armature's X the same weights, left and right exchanged",
+    )
+    make_parent: bool = setting(
+        True, "Make Parent", "Make the armature the parent of meshes that had neither an armature nor a parent"
     )
     threads: int = threads()

@@ -11,7 +11,7 @@ from .. import csr, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..reporting import DesparsifyReport
-from ..scene import armature, mesh, sculpting, vertex_groups, weight_state
+from ..scene import armature, mesh, object_state, sculpting, vertex_groups
 from ..scene.error import SceneError
 from .params import DesparsifyParams
 
@@ -49,7 +49,7 @@ def desparsify_all(
     answers = [_compute(obj, params) for obj in objects]
     if before_write:
         before_write(objects)
-    with weight_state.all_or_nothing(objects):
+    with object_state.all_or_nothing(objects):
         return [_write(obj, answer, params.n) for obj, answer in zip(objects, answers, strict=True)]
 
 

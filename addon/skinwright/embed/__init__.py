@@ -14,9 +14,10 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names
 from ..retarget.inputs import joined, joined_rows
-from ..scene import armature, embedded, mesh, rest_bones
+from ..scene import armature, embedded, mesh, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
+from ..scene.watched import Watched
 from .params import EmbedParams
 
 __all__ = ["EmbedParams", "EmbedReport", "embed_armature", "steps"]
@@ -62,18 +63,33 @@ def steps(
     context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: EmbedParams
 ) -> Jobs[EmbedReport]:
     """The same, job by job. Nothing is made before all is computed."""
+    source = _rig_of(source)
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
-    positions, triangles, _ = joined([mesh.read(obj) for obj in targets])
+    shapes = [mesh.read(obj) for obj in targets]
+    for obj, shape in zip(targets, shapes, strict=True):
+        if not len(shape.triangles):
+            raise SceneError(f"{obj.name} has no faces: bones are laid into a surface, so give it some")
+    positions, triangles, _ = joined(shapes)
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
     if params.method == "template":
         donor = _donor(context, source, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
+    seen = Watched([source, *targets])
     embedding = yield native.start_embedding(source.name, (positions, triangles), arrays, donor, **options)
+    seen.check()
     return _write(context, source, list(targets), bones, embedding, params)
+
+
+def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
+    """The armature that is meant: the object itself, or the one that deforms it."""
+    rig = source if source.type == "ARMATURE" else armature.find(source)
+    if rig is None:
+        raise SceneError(f"{source.name} is no armature and has none: pick the armature of another character")
+    return rig
 
 
 def _donor(
@@ -111,14 +127,17 @@ def _write(
     name = f"{targets[0].name} Rig"
     confidence = dict(zip(bones.names, embedding.confidence.tolist(), strict=True))
     places = {b: (h, t) for b, h, t in zip(bones.names, embedding.heads, embedding.tails, strict=True)}
-    rig = embedded.create(context, name, source, bones, places)
-    embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
-    if params.bind:
-        for obj in targets:
-            if armature.find(obj) is None:
-                armature.attach(obj, rig)
     outside = [bones.names[j] for j in embedding.report["outside"]]
     warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
-    return EmbedReport(
-        rig.name, [obj.name for obj in targets], confidence, outside, embedding.report["seconds"], warnings
-    )
+    meshes = [obj.name for obj in targets]
+    rig = embedded.create(context, name, source, bones, places)
+    try:
+        with object_state.all_or_nothing(targets):
+            embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
+            for obj in targets if params.bind else ():
+                if armature.find(obj) is None:
+                    armature.bind(obj, rig)
+            return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
+    except BaseException:
+        embedded.remove(rig)
+        raise

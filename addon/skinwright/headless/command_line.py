@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 
-from .. import autoskin, declared, files, native
+from .. import autoskin, declared, embed, files, native
 from ..declared import SettingError
 from ..errors import Refused, internal
 from ..reporting import AutoskinReport, Report, SculptReport
@@ -28,8 +28,8 @@ from . import wardrobe as wardrobe_command
 from . import weights as weights_command
 
 DONE, FAILED, USAGE = 0, 1, 2
-Params = TransferParams | SculptParams | RetargetParams | autoskin.AutoskinParams
-AnyReport = Report | SculptReport | RetargetReport | AutoskinReport
+Params = TransferParams | SculptParams | RetargetParams | autoskin.AutoskinParams | embed.EmbedParams
+AnyReport = Report | SculptReport | RetargetReport | AutoskinReport | embed.EmbedReport
 
 
 class _Failure(Refused):
@@ -45,6 +45,7 @@ def main(arguments: list[str]) -> int:
     _add_sculpt(commands.add_parser("sculpt", help="turn recorded sculpts of a posed mesh into weights"))
     _add_retarget(commands.add_parser("retarget", help="take the weights of another character"))
     _add_autoskin(commands.add_parser("autoskin", help="compute weights for the bones of an armature from scratch"))
+    _add_embed(commands.add_parser("embed", help="put the armature of another character into meshes that have none"))
     _add_wardrobe(commands.add_parser("wardrobe", help="transfer many garments to many bodies"))
     _add_weights(commands.add_parser("weights", help="store, restore, compare, export and import weights"))
     _add_refine(commands.add_parser("refine", help="bake refined skin to corrective keys or a point cache"))
@@ -72,6 +73,22 @@ def retarget(arguments: list[str]) -> int:
     description = "Take the weights of another character with a similar skeleton."
     parser = argparse.ArgumentParser(prog="retarget_weights.py", description=description)
     _add_retarget(parser)
+    return _run(parser, arguments)
+
+
+def automatic_weights(arguments: list[str]) -> int:
+    """The same without the word `autoskin`, for the script."""
+    description = "Compute weights for the bones of an armature from scratch."
+    parser = argparse.ArgumentParser(prog="automatic_weights.py", description=description)
+    _add_autoskin(parser)
+    return _run(parser, arguments)
+
+
+def embed_armature(arguments: list[str]) -> int:
+    """The same without the word `embed`, for the script."""
+    description = "Put the armature of another character into meshes that have none."
+    parser = argparse.ArgumentParser(prog="embed_armature.py", description=description)
+    _add_embed(parser)
     return _run(parser, arguments)
 
 
@@ -129,6 +146,15 @@ def _add_autoskin(parser: argparse.ArgumentParser) -> None:
     _add_common(parser, autoskin.AutoskinParams())
     read_settings = lambda settings: declared.from_json(autoskin.AutoskinParams, settings)  # noqa: E731
     parser.set_defaults(work=_autoskin, read=read_settings, inputs=("settings",))
+
+
+def _add_embed(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("blend", nargs="?", type=Path, help="file to open first; without it the one that is open")
+    parser.add_argument("--source", required=True, help="armature of the character that the bones are taken from")
+    parser.add_argument("--target", required=True, action="append", help="mesh that gets them; may be repeated")
+    _add_common(parser, embed.EmbedParams())
+    read_settings = lambda settings: declared.from_json(embed.EmbedParams, settings)  # noqa: E731
+    parser.set_defaults(work=_embed, read=read_settings, inputs=("settings",))
 
 
 def _add_wardrobe(parser: argparse.ArgumentParser) -> None:
@@ -251,6 +277,11 @@ def _retarget(options: argparse.Namespace, params: RetargetParams) -> RetargetRe
 def _autoskin(options: argparse.Namespace, params: autoskin.AutoskinParams) -> AutoskinReport:
     rig = object_named(options.armature) if options.armature else None
     return autoskin.automatic_weights([mesh_named(name) for name in options.target], rig, params)
+
+
+def _embed(options: argparse.Namespace, params: embed.EmbedParams) -> embed.EmbedReport:
+    targets = [mesh_named(name) for name in options.target]
+    return embed.embed_armature(bpy.context, object_named(options.source), targets, params)
 
 
 def _sculpt(options: argparse.Namespace, params: SculptParams) -> SculptReport:

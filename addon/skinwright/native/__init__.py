@@ -45,17 +45,14 @@ def problem() -> str:
 @cache
 def addon_version() -> str:
     """The version in the manifest."""
-    return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text())["version"]
-
-
-# The part of the free memory that one piece of work may take; the preferences set it.
-memory_share = 0.5
+    return tomllib.loads((Path(__file__).parent.parent / "blender_manifest.toml").read_text(encoding="utf-8"))[
+        "version"
+    ]
 
 
 def _set_budget() -> None:
     """Before each piece of work, as what is free changes."""
-    free = memory.free_bytes()
-    _module.set_memory_budget(None if free is None else int(free * memory_share))
+    _module.set_memory_budget(memory.budget())
 
 
 class Source:
@@ -207,10 +204,11 @@ class Refiner:
 
 def skin(positions: NDArray, rows: Rows, pose_from_rest: NDArray, rest_bones: NDArray | None) -> NDArray[np.float32]:
     """(V, 3) as the Armature modifier poses them: linearly, or with Preserve Volume if rest matrices are given."""
-    weights = _module.Weights(*rows, len(pose_from_rest))
-    if rest_bones is None:
-        return _module.linear_blend(positions, weights, pose_from_rest)
-    return _module.dual_quaternion_blend(positions, weights, pose_from_rest, rest_bones=rest_bones)
+    with _naming("Posing"):
+        weights = _module.Weights(*rows, len(pose_from_rest))
+        if rest_bones is None:
+            return _module.linear_blend(positions, weights, pose_from_rest)
+        return _module.dual_quaternion_blend(positions, weights, pose_from_rest, rest_bones=rest_bones)
 
 
 def closest(

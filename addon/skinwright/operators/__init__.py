@@ -6,6 +6,7 @@ from . import (
     check_weights,
     desparsify,
     embed_armature,
+    landmarks,
     match,
     panel_buttons,
     presets,
@@ -33,5 +34,6 @@ MODULES = (
     panel_buttons,
     retarget_weights,
     bone_map,
+    landmarks,
     embed_armature,
 )

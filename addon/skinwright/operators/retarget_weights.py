@@ -57,7 +57,7 @@ class SKINWRIGHT_OT_retarget_weights(LongWork, RetargetSettings, SkinwrightOpera
         settings, chosen = context.scene.skinwright.retarget, targets(context)
         rig = armature.find(chosen[0])
         given = settings.given_map(settings.source, rig) if rig else {}
-        params = self.to_params(preferences.threads(context), given)
+        params = self.to_params(preferences.threads(context), given, settings.given_landmarks())
         return steps(context, settings.source, chosen, params, before_write=self.keep_before)
 
 

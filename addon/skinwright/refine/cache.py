@@ -9,9 +9,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files, jobs
-from ..scene import mesh_cache, poses
+from .. import files, jobs, memory
+from ..scene import mesh_cache, object_state, poses
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from . import character as characters
 from .params import CacheFormat, RefineParams
 from .solving import Solving
@@ -57,18 +58,27 @@ def steps(
     mesh_cache.check(obj)
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)
+    seen = Watched([obj, bpy.data.objects[character.rig]])
+    memory.expect(f"Refining {last - first + 1} frames of {obj.name}", _bytes(character, last - first + 1))
     matrices = list(_poses(obj, character, range(first, last + 1)))
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
     tasks = [lambda pose=pose: refiner.solve(pose, quality="bake") for pose in matrices]
     solved = yield Solving(tasks)
+    seen.check()
     positions = np.stack(solved)
     if not np.isfinite(positions).all():
         raise SceneError(f"{obj.name}: a refined frame is not finite; nothing was written")
     fps = bpy.context.scene.render.fps / bpy.context.scene.render.fps_base
     content = pc2(positions, first) if kind == "pc2" else mdd(positions, first, fps)
-    files.write_whole(path, content)
-    mesh_cache.play(obj, path, kind, first)
+    with object_state.all_or_nothing([obj]):
+        mesh_cache.play(obj, path, kind, first)
+        files.write_whole(path, content)
     return CacheReport(obj.name, str(path), len(positions))
+
+
+def _bytes(character: characters.Character, frames: int) -> int:
+    """Of the solved frames, the same in one array, and the file's content; and of the poses."""
+    return frames * (3 * character.positions.nbytes + 2 * character.rest_bones.nbytes)
 
 
 def _poses(obj: bpy.types.Object, character: characters.Character, frames: range) -> Iterator[NDArray[np.float64]]:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from .. import jobs, native
 from ..scene import driven_keys
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from . import character as characters
 from .character import Character
 from .drivers import CHANNELS, expression
@@ -78,11 +80,18 @@ class _Key:
 
 
 def steps(
-    obj: bpy.types.Object, params: CorrectiveParams, chosen: set[str] | None = None
+    obj: bpy.types.Object,
+    params: CorrectiveParams,
+    chosen: set[str] | None = None,
+    certify: Callable[[CorrectiveReport], None] | None = None,
 ) -> "jobs.Jobs[CorrectiveReport]":
-    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved."""
+    """Bake correctives of the chosen joints, or of all that skin follows; nothing is written before all is solved.
+
+    If `certify`, which gets the report once the keys are there, raises, the keys go again.
+    """
     driven_keys.check(obj)
     character = characters.read(obj)
+    seen = Watched([obj, bpy.data.objects[character.rig]])
     bones = joints(character, chosen or set())
     if not bones:
         raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
@@ -90,6 +99,7 @@ def steps(
     poses = samples(bones, params)
     tasks = [lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses]
     solved = yield Solving(tasks)
+    seen.check()
     report = CorrectiveReport(obj.name, character.rig)
     kept = [(key, certificate) for key, certificate in solved if key is not None]
     for key, _ in kept:
@@ -98,7 +108,10 @@ def steps(
                 f"{obj.name}: no finite offsets at {character.bones[key.sample.bone]}; nothing was written"
             )
     report.certificates = [certificate for _, certificate in kept]
-    _write(obj, character, [key for key, _ in kept], report)
+    with driven_keys.all_or_nothing(obj, RECORD):
+        _write(obj, character, [key for key, _ in kept], report)
+        if certify:
+            certify(report)
     return report
 
 
@@ -176,6 +189,7 @@ def remove(obj: bpy.types.Object) -> int:
     record = baked(obj)
     if record is None:
         return 0
-    count = driven_keys.remove(obj, record["keys"], basis_too=record.get("made_basis", False))
-    del obj[RECORD]
+    with driven_keys.all_or_nothing(obj, RECORD):
+        count = driven_keys.remove(obj, record["keys"], basis_too=record.get("made_basis", False))
+        del obj[RECORD]
     return count

@@ -38,10 +38,14 @@ def start(obj: bpy.types.Object, garments: list[bpy.types.Object], params: Refin
         if tuple(map(tuple, garment.matrix_world)) != tuple(map(tuple, obj.matrix_world)):
             raise SceneError(f"{garment.name} is moved, turned or scaled against {obj.name}: apply both transforms")
         live.garments.append(follow(body, characters.read(garment), np.eye(4)))
-    for shown in (obj, *garments):
-        preview_object.show(shown)
-    current = live
-    update()
+    try:
+        for shown in (obj, *garments):
+            preview_object.show(shown)
+        current = live
+        update()
+    except BaseException:
+        stop()
+        raise
     return live
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, mesh, rest_bones, sculpting, vertex_groups
+from ..scene import armature, landmarks, mesh, rest_bones, sculpting, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from . import bone_map
@@ -153,9 +153,12 @@ def _landmarks(source: Character, target: Character, params: RetargetParams) -> 
 
 
 def _vertex(character: Character, name: str, vertex: int) -> int:
+    place = landmarks.place_of_empty(name)
+    if place is not None:
+        return int(np.linalg.norm(character.positions - place, axis=1).argmin())
     for obj, start, end in zip(character.meshes, character.starts, character.starts[1:], strict=False):
         if obj.name == name:
             if not 0 <= vertex < end - start:
                 raise SceneError(f"A landmark names vertex {vertex} of {name}, which has {end - start}")
             return start + vertex
-    raise SceneError(f"A landmark names {name}, which is no mesh of {character.armature.name}")
+    raise SceneError(f"A landmark names {name}, which is neither an empty nor a mesh of {character.armature.name}")

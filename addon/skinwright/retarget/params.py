@@ -9,7 +9,7 @@ from ..declared import Params, max_influences, setting, threads
 
 Method = Literal["skeleton", "biharmonic"]
 MatchPoints = Literal["surface", "vertices"]
-# Source object and vertex, target object and vertex.
+# Source object and vertex, target object and vertex; an empty stands for the vertex nearest to it.
 Landmark = tuple[str, int, str, int]
 
 
@@ -54,7 +54,7 @@ class RetargetParams(Params):
         "Eigenpairs",
         "Eigenpairs of the Biharmonic method; more tell finer places apart",
         least=1,
-        most=1000,
+        most=2000,
         native=True,
     )
     smoothing_iterations: int = setting(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import csr
-from ..scene import attributes, vertex_groups, weight_state
+from ..scene import attributes, object_state, vertex_groups
 from .compute import Result
 from .inputs import Character, Pair
 from .params import RetargetParams
@@ -28,12 +28,13 @@ def write(
     if before_write:
         before_write(pair.target.meshes)
     warnings = _warnings(pair, result)
-    with weight_state.all_or_nothing(pair.target.meshes):
+    shown = [*pair.source.meshes, *pair.target.meshes] if params.show_correspondence else []
+    with object_state.all_or_nothing(pair.target.meshes), attributes.all_or_nothing(shown, ATTRIBUTE):
         for obj, start, end in _parts(pair.target):
             warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
         if params.show_correspondence:
             _show(pair, result)
-    return _report(pair, result, warnings)
+        return _report(pair, result, warnings)
 
 
 def _parts(character: Character) -> list[tuple[bpy.types.Object, int, int]]:

@@ -108,23 +108,40 @@ def is_posed(armature: bpy.types.Object) -> bool:
 
 
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
-    """Let the armatures that deform `source` deform `obj` in the same way: by modifiers of the same settings.
+    """Let what deforms `source`, or `source` if it is an armature, deform `obj`: by modifiers of the same settings.
 
     They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
     """
-    mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
-    place = mirrors[-1] + 1 if mirrors else 0
+    place = _place_of_first(obj)
     models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
-    for rig in [m.object for m in models] or [find(source)]:
-        modifier = obj.modifiers.new(rig.name, "ARMATURE")
-        modifier.object = rig
-        obj.modifiers.move(len(obj.modifiers) - 1, place)
+    for rig in [m.object for m in models] or [source if source.type == "ARMATURE" else find(source)]:
+        _add_modifier(obj, rig, place)
         place += 1
     added = [m for m in obj.modifiers if m.type == "ARMATURE"]
     for modifier, model in zip(added, models, strict=False):
         for name in BINDING:
             setattr(modifier, name, getattr(model, name))
     return [modifier.name for modifier in added]
+
+
+def bind(obj: bpy.types.Object, rig: bpy.types.Object, *, make_parent: bool = False) -> None:
+    """Let armature `rig` deform `obj`, after mirroring; and carry it along if it has no parent and `make_parent`."""
+    _add_modifier(obj, rig, _place_of_first(obj))
+    if make_parent and obj.parent is None:
+        obj.parent = rig
+        obj.matrix_parent_inverse = rig.matrix_world.inverted_safe()
+
+
+def _place_of_first(obj: bpy.types.Object) -> int:
+    """Where in the stack an armature belongs."""
+    mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
+    return mirrors[-1] + 1 if mirrors else 0
+
+
+def _add_modifier(obj: bpy.types.Object, rig: bpy.types.Object, place: int) -> None:
+    modifier = obj.modifiers.new(rig.name, "ARMATURE")
+    modifier.object = rig
+    obj.modifiers.move(len(obj.modifiers) - 1, place)
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:

@@ -1,6 +1,7 @@
 """Shape keys that drivers turn on: sparse offsets, and rotations of a bone as variables."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -21,6 +22,35 @@ def check(obj: bpy.types.Object) -> None:
         raise SceneError(f"{obj.name} shares its mesh with {shared[0]}: make it single-user, or both would change")
     if obj.data.shape_keys and not obj.data.shape_keys.use_relative:
         raise SceneError(f"{obj.name} has absolute shape keys: turn Relative on, correctives are relative")
+
+
+@contextmanager
+def all_or_nothing(obj: bpy.types.Object, record: str) -> Iterator[None]:
+    """Whatever exception leaves the block, keys, drivers and the property `record` of the object are as before."""
+    kept, active = obj.data.copy(), obj.active_shape_key_index
+    told = obj.get(record)
+    try:
+        yield
+    except BaseException:
+        _swap(obj, kept)
+        obj.active_shape_key_index = active
+        if told is not None:
+            obj[record] = told
+        elif record in obj:
+            del obj[record]
+        raise
+    bpy.data.meshes.remove(kept)
+
+
+def _swap(obj: bpy.types.Object, kept: bpy.types.Mesh) -> None:
+    """Put the copy in the place of the mesh, with all that points to it."""
+    spoiled, name = obj.data, obj.data.name
+    key = spoiled.shape_keys.name if spoiled.shape_keys else ""
+    spoiled.user_remap(kept)
+    bpy.data.meshes.remove(spoiled)
+    kept.name = name
+    if key and kept.shape_keys:
+        kept.shape_keys.name = key
 
 
 def add(

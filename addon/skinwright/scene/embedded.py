@@ -26,20 +26,42 @@ def create(
     data = source.data.copy()
     data.name = name
     rig = bpy.data.objects.new(name, data)
-    context.collection.objects.link(rig)
+    try:
+        context.collection.objects.link(rig)
+        _shape(context, rig, bones, places)
+    except BaseException:
+        remove(rig)
+        raise
+    return rig
+
+
+def remove(rig: bpy.types.Object) -> None:
+    """Take an armature away that was made here."""
+    data = rig.data
+    bpy.data.objects.remove(rig)
+    if data.users == 0:
+        bpy.data.armatures.remove(data)
+
+
+def _shape(
+    context: bpy.types.Context,
+    rig: bpy.types.Object,
+    bones: RestBones,
+    places: Mapping[str, tuple[NDArray[np.float32], NDArray[np.float32]]],
+) -> None:
+    """Place the bones in Edit mode; mode, selection and active object are then as before."""
     before, selected = context.view_layer.objects.active, list(context.selected_objects)
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     try:
-        _place(data, bones, places)
+        _place(rig.data, bones, places)
     finally:
         bpy.ops.object.mode_set(mode="OBJECT")
         context.view_layer.objects.active = before
         for obj in selected:
             obj.select_set(True)
-    return rig
 
 
 def _place(

@@ -1,8 +1,6 @@
 """All weights of an object as they stand, to the bit and in stored order, and what brings them back."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -114,37 +112,3 @@ def _add_in_order(obj: bpy.types.Object, state: WeightState, chosen: NDArray[np.
         now = entries[rank[entries] == position]
         for index, members in _by_group(row[now], state.groups[now].astype(np.int64)):
             obj.vertex_groups[index].add(members, 0.0, "REPLACE")
-
-
-@dataclass(frozen=True)
-class _Target:
-    """What an operation may change of an object."""
-
-    object: bpy.types.Object
-    mesh: bpy.types.Mesh
-    state: WeightState
-    modifiers: list[str]
-
-
-@contextmanager
-def all_or_nothing(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Whatever exception leaves the block, the weights, meshes and modifiers of `objects` are as they were before."""
-    before = [_Target(o, o.data, capture(o), [m.name for m in o.modifiers]) for o in objects]
-    try:
-        yield
-    except BaseException:
-        for target in before:
-            _bring_back(target)
-        raise
-
-
-def _bring_back(target: _Target) -> None:
-    obj, mesh = target.object, target.mesh
-    for modifier in [m for m in obj.modifiers if m.name not in target.modifiers]:
-        obj.modifiers.remove(modifier)
-    copy = obj.data
-    if copy != mesh:
-        obj.data = mesh
-        if copy.users == 0:
-            bpy.data.meshes.remove(copy)
-    apply(obj, target.state)

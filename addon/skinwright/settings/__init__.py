@@ -7,7 +7,7 @@ from bpy.types import Object, PropertyGroup, Scene
 from .embed import SKINWRIGHT_PG_embed
 from .overlay import SKINWRIGHT_PG_overlay
 from .refine import SKINWRIGHT_PG_refine
-from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_retarget
+from .retarget import SKINWRIGHT_PG_bone_pair, SKINWRIGHT_PG_landmark, SKINWRIGHT_PG_retarget
 from .sculpt import SKINWRIGHT_PG_sculpt
 from .target import SKINWRIGHT_PG_object
 from .transfer import SKINWRIGHT_PG_transfer, TransferSettings
@@ -33,6 +33,7 @@ CLASSES = (
     SKINWRIGHT_PG_sculpt,
     SKINWRIGHT_PG_refine,
     SKINWRIGHT_PG_bone_pair,
+    SKINWRIGHT_PG_landmark,
     SKINWRIGHT_PG_retarget,
     SKINWRIGHT_PG_embed,
     SKINWRIGHT_PG_scene,

@@ -5,7 +5,20 @@ from typing import TYPE_CHECKING, Any
 from ..autoskin.params import AutoskinParams
 from .properties import properties, values
 
-_NAMES = ["method", "max_influences", "stiffness", "resolution", "selected_bones", "selected_only"]
+_NAMES = [
+    "method",
+    "max_influences",
+    "stiffness",
+    "resolution",
+    "geometry",
+    "join_borders",
+    "selected_bones",
+    "selected_only",
+    "mask_group",
+    "mix_factor",
+    "symmetrize",
+    "make_parent",
+]
 
 
 class AutoskinSettings:

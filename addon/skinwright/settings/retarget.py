@@ -6,7 +6,7 @@ from bpy.props import CollectionProperty, FloatProperty, IntProperty, PointerPro
 from bpy.types import Object, PropertyGroup, UILayout
 
 from ..declared import declared
-from ..retarget.params import RetargetParams
+from ..retarget.params import Landmark, RetargetParams
 from .properties import properties, values
 
 # Threads are a preference.
@@ -36,9 +36,9 @@ class RetargetSettings:
         layout.prop(self, "max_influences")
         layout.prop(self, "show_correspondence")
 
-    def to_params(self, threads: int, bone_map: dict[str, str]) -> RetargetParams:
+    def to_params(self, threads: int, bone_map: dict[str, str], landmarks: tuple[Landmark, ...] = ()) -> RetargetParams:
         """As plain values. Raises SettingError for a value outside its range."""
-        return RetargetParams(**values(self, RetargetParams), threads=threads, bone_map=bone_map)
+        return RetargetParams(**values(self, RetargetParams), threads=threads, bone_map=bone_map, landmarks=landmarks)
 
 
 class SKINWRIGHT_PG_bone_pair(PropertyGroup):
@@ -50,6 +50,28 @@ class SKINWRIGHT_PG_bone_pair(PropertyGroup):
     found: StringProperty(name="Partner Found", description="The partner that was found automatically")
     how: StringProperty(name="Found By", description="What the partner was found by")
     confidence: FloatProperty(name="Confidence", description="How sure the partner is", min=0, max=1)
+
+
+def _on_surface(_self: Any, obj: Object) -> bool:
+    return obj.type in ("EMPTY", "MESH")
+
+
+class SKINWRIGHT_PG_landmark(PropertyGroup):
+    """One place on both characters: a vertex of a mesh, or the vertex nearest to an empty."""
+
+    source: PointerProperty(
+        name="On Source", description="Empty on the source, or the mesh of the vertex", type=Object, poll=_on_surface
+    )
+    source_vertex: IntProperty(name="Vertex", description="Vertex of the source's mesh", default=0, min=0)
+    target: PointerProperty(
+        name="On Target", description="Empty on the target, or the mesh of the vertex", type=Object, poll=_on_surface
+    )
+    target_vertex: IntProperty(name="Vertex", description="Vertex of the target's mesh", default=0, min=0)
+
+    def put(self, side: str, obj: Object, vertex: int) -> None:
+        """Set the place on the `side` source or target."""
+        setattr(self, side, obj)
+        setattr(self, f"{side}_vertex", vertex)
 
 
 class SKINWRIGHT_PG_retarget(RetargetSettings, PropertyGroup):
@@ -66,6 +88,14 @@ class SKINWRIGHT_PG_retarget(RetargetSettings, PropertyGroup):
     bone_map_of: StringProperty(
         name="Bone Map Of", description="The armatures that the bone map was made for", options={"HIDDEN"}
     )
+
+    landmarks: CollectionProperty(type=SKINWRIGHT_PG_landmark)
+    landmarks_index: IntProperty(name="Landmark", description="The landmark that is shown as active", default=0, min=0)
+
+    def given_landmarks(self) -> tuple[Landmark, ...]:
+        """Those that have a place on both characters."""
+        complete = [entry for entry in self.landmarks if entry.source and entry.target]
+        return tuple((e.source.name, e.source_vertex, e.target.name, e.target_vertex) for e in complete)
 
     def given_map(self, source: Object, target: Object) -> dict[str, str]:
         """The map that was made for these armatures, as the artist left it; nothing for others."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
-from ..scene import mesh, sculpting, weight_state
+from ..scene import mesh, object_state, sculpting, weight_state
 from ..scene.weight_state import WeightState
 from ..transfer import scalar_fields
 from .record import Record
@@ -47,7 +47,7 @@ def restore(
     aligned = align(obj, kept, threads)
     if before_write:
         before_write([obj])
-    with weight_state.all_or_nothing([obj]):
+    with object_state.all_or_nothing([obj]):
         weight_state.apply(obj, aligned.state)
     return aligned
 

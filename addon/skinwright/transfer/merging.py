@@ -9,6 +9,9 @@ from ..csr import Rows
 # Sums of f32 weights the artist normalised differ from 1 by this much at most.
 SUM_TOLERANCE = 1e-4
 
+# One for all vertices, or (V,) one for each.
+Factor = float | NDArray[np.float64]
+
 
 def merge(
     transferred: Rows,
@@ -16,7 +19,7 @@ def merge(
     *,
     held: NDArray[np.bool_],
     chosen: NDArray[np.bool_],
-    factor: float,
+    factor: Factor,
     max_influences: int,
 ) -> Rows:
     """Rows over the columns that are not held: `factor` of the transferred and the rest of the old weights.
@@ -41,7 +44,7 @@ def merge(
     return rows
 
 
-def _joined(new: Rows, old: Rows, factor: float, remainder: NDArray[np.float64]) -> Rows:
+def _joined(new: Rows, old: Rows, factor: Factor, remainder: NDArray[np.float64]) -> Rows:
     """`factor` of the new and the rest of the old weights; the old alone where there are no new ones."""
     new_share = np.where(csr.row_sums(new) > 0, factor, 0.0)
     if (new_share == 1).all() or not old.values.size:
@@ -49,7 +52,7 @@ def _joined(new: Rows, old: Rows, factor: float, remainder: NDArray[np.float64])
     return _scaled(_mixed(new, old, new_share, 1.0 - new_share), remainder)
 
 
-def _beside(new: Rows, old: Rows, chosen: NDArray[np.bool_], factor: float, remainder: NDArray[np.float64]) -> Rows:
+def _beside(new: Rows, old: Rows, chosen: NDArray[np.bool_], factor: Factor, remainder: NDArray[np.float64]) -> Rows:
     """The chosen columns as they come, and the old weights of the others scaled to what that leaves."""
     every = np.ones(len(remainder))
     new = _mixed(new, csr.keep_columns(old, chosen), factor * every, (1 - factor) * every)

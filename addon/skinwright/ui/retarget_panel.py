@@ -75,6 +75,63 @@ class SKINWRIGHT_PT_retarget_bones(Tab, Panel):
         row.operator("skinwright.bone_map_save", text="Save", icon="EXPORT")
 
 
+class SKINWRIGHT_UL_landmarks(UIList):
+    """Landmarks with both of their places; those that lack one are marked."""
+
+    def draw_item(
+        self,
+        _context: Context,
+        layout: UILayout,
+        _settings: Any,
+        entry: Any,
+        _icon: int,
+        _active: Any,
+        *_more: Any,
+    ) -> None:
+        """Name and two places. Blender counts the named arguments: at least seven."""
+        row = layout.row(align=True)
+        row.prop(entry, "name", text="", emboss=False, icon="DOT" if entry.source and entry.target else "ERROR")
+        for side in ("source", "target"):
+            obj = getattr(entry, side)
+            vertex = f" {getattr(entry, f'{side}_vertex')}" if obj and obj.type == "MESH" else ""
+            row.label(text=f"{obj.name}{vertex}" if obj else f"no {side}")
+
+
+class SKINWRIGHT_PT_retarget_landmarks(Tab, Panel):
+    """Places that the artist says are the same, for the Biharmonic method."""
+
+    bl_label = "Landmarks"
+    bl_parent_id = "SKINWRIGHT_PT_retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        """The other method does not use them."""
+        return context.scene.skinwright.retarget.method == "BIHARMONIC"
+
+    def draw(self, context: Context) -> None:
+        """List, the active one's places, and what fills it."""
+        layout, settings = self.layout, context.scene.skinwright.retarget
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        row = layout.row(align=True)
+        row.operator("skinwright.landmark_pick", icon="VERTEXSEL")
+        row.operator("skinwright.landmark_add", icon="EMPTY_AXIS")
+        if not settings.landmarks:
+            return
+        row = layout.row()
+        row.template_list("SKINWRIGHT_UL_landmarks", "", settings, "landmarks", settings, "landmarks_index", rows=4)
+        column = row.column(align=True)
+        column.operator("skinwright.landmark_remove", text="", icon="REMOVE").which = "ACTIVE"
+        column.operator("skinwright.landmark_remove", text="", icon="TRASH").which = "ALL"
+        entry = settings.landmarks[min(settings.landmarks_index, len(settings.landmarks) - 1)]
+        for side in ("source", "target"):
+            layout.prop(entry, side)
+            obj = getattr(entry, side)
+            if obj and obj.type == "MESH":
+                layout.prop(entry, f"{side}_vertex")
+
+
 class SKINWRIGHT_PT_embed(Tab, Panel):
     """An armature for a mesh that has none."""
 
@@ -106,8 +163,10 @@ class SKINWRIGHT_PT_retarget_settings(Tab, Panel):
 
 register, unregister = registration(
     SKINWRIGHT_UL_bone_map,
+    SKINWRIGHT_UL_landmarks,
     SKINWRIGHT_PT_retarget,
     SKINWRIGHT_PT_retarget_bones,
+    SKINWRIGHT_PT_retarget_landmarks,
     SKINWRIGHT_PT_retarget_settings,
     SKINWRIGHT_PT_embed,
 )

@@ -7,7 +7,7 @@ mod common;
 use common::{Fixture, body, tube};
 use divan::Bencher;
 use skinwright_core::adjacency::Topology;
-use skinwright_core::fill::system::{assemble, independent_blocks, number_unknowns};
+use skinwright_core::fill::{Constraint, Fill};
 use skinwright_core::laplacian::Laplacian;
 use skinwright_core::transfer::{Inpainting, Settings, Source, TargetMesh};
 use skinwright_core::{Progress, TriMesh, Weights};
@@ -48,17 +48,13 @@ fn laplacian(bencher: Bencher) {
 #[divan::bench]
 fn blocks_and_assembly(bencher: Bencher) {
     let garment = garment();
-    let mesh = TriMesh::new(&garment.positions, &garment.triangles, "target").unwrap();
-    let laplacian = Laplacian::new(&mesh, &Topology::new(&garment.triangles, garment.positions.len()));
     let progress = Progress::default();
     let mut prepared = Inpainting::new(source(), target_mesh(&garment), &Settings::default(), &progress).unwrap();
     let matched = prepared.matched(None, &Settings::default()).unwrap();
-    let unknown: Vec<bool> = matched.iter().map(|m| !m).collect();
-    bencher.bench_local(|| {
-        let blocks = independent_blocks(&laplacian, &unknown, 0.1);
-        let number = number_unknowns(&blocks, garment.positions.len());
-        blocks.iter().map(|unknowns| assemble(&laplacian, unknowns, &number, 0.1)).collect::<Vec<_>>()
-    });
+    let constraints: Vec<Constraint> =
+        matched.iter().map(|&matched| if matched { Constraint::Fixed } else { Constraint::Free }).collect();
+    let mut fill = Fill::new(garment.positions, garment.triangles, None).unwrap();
+    bencher.bench_local(move || fill.assemble(constraints.clone(), 0.1, &progress).unwrap());
 }
 
 #[divan::bench(args = [0, 10])]

@@ -1,22 +1,31 @@
-//! The numerics of Skinwright: skin-weight transfer, desparsification and sculpt-to-weights.
+//! Skin weights for character meshes, without any I/O or Python: the numerics of Skinwright.
 //!
-//! Parts (mesh, surface, linear solver, ...) know nothing of the operations built on them, and
-//! operations know nothing of each other. Geometry is `f32` in world space, solves are `f64`,
-//! angles are radians, weights are CSR.
+//! Operations, each a module: [`transfer`] moves weights from a body to garments, [`desparsify`] gives vertices more
+//! candidate bones, [`sculpt`] turns what was sculpted on a posed character into weights, [`autoskin`] makes first weights,
+//! [`embed`] puts a skeleton into a mesh, [`retarget`] moves weights between characters, [`refine`] moves skin around bent
+//! joints. Operations know nothing of each other.
+//!
+//! Parts, on which they are built and which know nothing of them: [`TriMesh`], [`Weights`], [`Weld`], [`Progress`], and the
+//! modules [`adjacency`], [`biharmonic`], [`fill`], [`inside`], [`laplacian`], [`penetration`], [`skinning`], [`surface`].
+//!
+//! Geometry is `f32` in one space per call, solves are `f64`, angles are radians, weights are sparse rows (CSR). Answers do
+//! not depend on the number of threads, to the bit. `examples/` has programs to start from.
 #![forbid(unsafe_code)]
+#![deny(rustdoc::broken_intra_doc_links)]
 
 pub mod adjacency;
 pub mod autoskin;
 pub mod biharmonic;
 pub mod desparsify;
 pub mod embed;
-pub mod error;
+mod error;
 pub mod fill;
 pub mod inside;
 pub mod laplacian;
-pub mod mesh;
+mod limit;
+mod mesh;
 pub mod penetration;
-pub mod progress;
+mod progress;
 pub mod refine;
 mod registration;
 pub mod retarget;
@@ -24,8 +33,9 @@ pub mod sculpt;
 pub mod skinning;
 pub mod surface;
 pub mod transfer;
-pub mod weights;
-pub mod weld;
+mod weights;
+mod weld;
+mod welded;
 
 pub use error::{Error, Result};
 pub use mesh::TriMesh;

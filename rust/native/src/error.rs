@@ -1,6 +1,7 @@
 //! The one table from the core's errors to Python exceptions, and the one door that frees the GIL.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -47,10 +48,18 @@ pub fn to_python(error: Error) -> PyErr {
 /// What work on the core's side comes to: its own result, or the message of a panic, which is a bug.
 pub type Outcome<T> = Result<skinwright_core::Result<T>, String>;
 
+/// The process that has the threads shared by all work. A child made by `fork` has none of them: it would wait for ever.
+static OWNER: OnceLock<u32> = OnceLock::new();
+
+/// Whether the threads that this module has started are those of another process.
+pub fn is_forked() -> bool {
+    *OWNER.get_or_init(std::process::id) != std::process::id()
+}
+
 /// Runs `work` on `threads` threads (0: all of the machine's) and catches panics.
 pub fn run<T: Send>(threads: usize, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> Outcome<T> {
     let work = || match threads {
-        0 => Ok(work()),
+        0 if !is_forked() => Ok(work()),
         n => {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
             pool.map(|pool| pool.install(work)).map_err(|error| format!("no {n} threads can be started: {error}"))

@@ -1,12 +1,13 @@
 //! Work on Rust's own threads, watched from Python.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use skinwright_core::Progress;
 
-use crate::error::{Outcome, SkinwrightError, finish, run};
+use crate::error::{Outcome, SkinwrightError, finish, is_forked, run};
 
 /// Turns what the core returned into what Python gets.
 type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
@@ -16,6 +17,8 @@ type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
 pub struct Job {
     progress: Arc<Progress>,
     thread: Mutex<Option<JoinHandle<Outcome<Present>>>>,
+    /// Held by whoever waits for the thread: others wait behind them.
+    turn: Mutex<()>,
     result: OnceLock<PyResult<Py<PyAny>>>,
 }
 
@@ -35,14 +38,15 @@ impl Job {
         };
         let thread = std::thread::Builder::new().spawn(move || run(threads, move || presented(&seen)));
         let thread = thread.map_err(|error| SkinwrightError::new_err(format!("no thread can be started: {error}")))?;
-        Ok(Self { progress, thread: Mutex::new(Some(thread)), result: OnceLock::new() })
+        Ok(Self { progress, thread: Mutex::new(Some(thread)), turn: Mutex::new(()), result: OnceLock::new() })
     }
 
     fn wait(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        if is_forked() {
+            return Err(SkinwrightError::new_err("this job runs in the process that started it: wait for it there"));
+        }
         let thread = self.thread.lock().expect("never poisoned").take();
-        let Some(thread) = thread else {
-            return Err(SkinwrightError::new_err("another thread is waiting for this job"));
-        };
+        let Some(thread) = thread else { return Err(SkinwrightError::new_err("this job was interrupted")) };
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
         finish(outcome)?(py)
     }
@@ -68,12 +72,14 @@ impl Job {
         self.progress.cancel();
     }
 
-    /// Waits for the work and returns what it gave, or raises its error. May be called again.
+    /// Waits for the work and returns what it gave, or raises its error. May be called again, and from several threads.
     fn result(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let turn = self.turn.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         if self.result.get().is_none() {
             let result = self.wait(py);
             let _ = self.result.set(result);
         }
+        drop(turn);
         match self.result.get().expect("just set") {
             Ok(result) => Ok(result.clone_ref(py)),
             Err(error) => Err(error.clone_ref(py)),

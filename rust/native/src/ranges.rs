@@ -53,6 +53,16 @@ pub fn members(object: &Bound<'_, PyAny>) -> PyResult<usize> {
     count("n", whole(object)?, 1..=MAX_MEMBERS as i64)
 }
 
+/// Most influences per vertex, 0 for no limit.
+pub fn influences(object: &Bound<'_, PyAny>) -> PyResult<usize> {
+    count("max_influences", whole(object)?, 0..=255)
+}
+
+/// Passes of smoothing.
+pub fn smoothing(object: &Bound<'_, PyAny>) -> PyResult<u32> {
+    Ok(count("smoothing_iterations", whole(object)?, 0..=1000)? as u32)
+}
+
 /// Passes of the proximal solve of a stroke.
 pub fn passes(object: &Bound<'_, PyAny>) -> PyResult<usize> {
     count("passes", whole(object)?, 1..=100)

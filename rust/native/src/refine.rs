@@ -11,7 +11,8 @@ use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, enter};
+use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked, to_python};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
@@ -28,8 +29,8 @@ impl Refiner {
     /// Runs `work` with the GIL freed, on the kept pool: starting threads takes longer than a stage of a frame.
     fn enter<T: Send>(&self, py: Python<'_>, work: impl FnOnce() -> skinwright_core::Result<T> + Send) -> PyResult<T> {
         match &self.pool {
-            Some(pool) => enter(py, 0, || pool.install(work)),
-            None => enter(py, 0, work),
+            Some(pool) if !is_forked() => enter(py, 0, || pool.install(work)),
+            _ => enter(py, 0, work),
         }
     }
 }
@@ -59,13 +60,15 @@ impl Refiner {
         let (weights, parents) = (weights.to_core(py)?, entries(&bone_parents));
         let segments = segments(&bone_segments)?;
         let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };
+        settings.check().map_err(to_python)?;
+        memory::expect("Preparing the refinement", memory::of_refiner(&positions, &triangles, cell))?;
         let build = || {
             let mesh = TriMesh::new(&positions, &triangles, "character")?;
             core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())
         };
         let core = enter(py, threads, build)?;
-        let pool = (threads > 0)
-            .then(|| ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started"));
+        let pool = (threads > 0).then(|| ThreadPoolBuilder::new().num_threads(threads).build()).transpose();
+        let pool = pool.map_err(|error| SkinwrightError::new_err(format!("no threads can be started: {error}")))?;
         Ok(Self { core, pool, last: Mutex::new(None) })
     }
 
@@ -168,6 +171,7 @@ pub fn intersecting_pairs<'py>(
     #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
+    memory::expect("Looking for intersections", memory::of_pairs(triangles.len()))?;
     let find = || {
         TriMesh::new(&positions, &triangles, "character")?;
         Ok(core::intersecting_pairs(&positions, &triangles))

@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, vectors};
 use crate::weights::Weights;
@@ -44,6 +45,12 @@ struct Owned {
 }
 
 impl Inputs {
+    fn expect_memory(&self) -> PyResult<()> {
+        let pairs = if self.settings.method == Method::Biharmonic { self.settings.n_pairs } else { 0 };
+        let bytes = memory::of_retarget(self.source.positions.len(), self.target.positions.len(), pairs);
+        memory::expect("Retargeting", bytes)
+    }
+
     fn run(&self, progress: &Progress) -> skinwright_core::Result<core::Retarget> {
         let source = TriMesh::new(&self.source.positions, &self.source.triangles, self.source.what)?;
         let target = TriMesh::new(&self.target.positions, &self.target.triangles, self.target.what)?;
@@ -88,7 +95,7 @@ macro_rules! retarget_function {
             bone_map: Vector<'_, i32>,
             method: &str,
             landmarks: Option<Matrix<'_, u32>>,
-            max_influences: usize,
+            #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
             #[pyo3(from_py_with = ranges::threads)] threads: usize,
             source_parents: Option<Vector<'_, i32>>,
             match_points: &str,
@@ -97,8 +104,8 @@ macro_rules! retarget_function {
             max_distance: f64,
             max_normal_angle: f64,
             max_stretch: f64,
-            n_pairs: usize,
-            smoothing_iterations: u32,
+            #[pyo3(from_py_with = ranges::pairs)] n_pairs: usize,
+            #[pyo3(from_py_with = ranges::smoothing)] smoothing_iterations: u32,
             smoothing_factor: f64,
         ) -> PyResult<$returns> {
             let settings = Settings {
@@ -135,6 +142,7 @@ macro_rules! retarget_function {
                 landmarks: landmarks.map(|pairs| landmarks_of(&pairs)).transpose()?.unwrap_or_default(),
                 settings,
             };
+            inputs.expect_memory()?;
             $finish(py, threads, inputs)
         }
     };

@@ -9,7 +9,7 @@ use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, MatchMethod, Se
 
 use crate::arrays::{Vector, entries};
 use crate::error::{InvalidParameter, to_python};
-use crate::ranges::{count, whole, within};
+use crate::ranges::{self, within};
 
 /// The names Python uses for the policies.
 pub(crate) fn policy_name(policy: IslandPolicy) -> &'static str {
@@ -62,9 +62,9 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "mask" => mask = mask_values(value.extract()?)?,
             "smoothness_length" => smoothness_length = length(name, &value)?,
             "relative_smoothness_length" => settings.smoothness_length = Length::Relative(share(name, &value, 100.0)?),
-            "smoothing_iterations" => settings.smoothing_iterations = count(name, whole(&value)?, 0..=1000)? as u32,
+            "smoothing_iterations" => settings.smoothing_iterations = ranges::smoothing(&value)?,
             "smoothing_factor" => settings.smoothing_factor = share(name, &value, 1.0)?,
-            "max_influences" => settings.max_influences = count(name, whole(&value)?, 0..=255)?,
+            "max_influences" => settings.max_influences = ranges::influences(&value)?,
             "method" => settings.method = named(name, value.extract()?, MatchMethod::ALL, method_name)?,
             "softness" => settings.softness = within(name, value.extract()?, 0.05..=10.0)?,
             "island_policy" => {

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 use crate::arrays::{Matrix, Vector, entries, read_only};
-use crate::error::to_python;
+use crate::error::{InvalidParameter, to_python};
 use crate::ranges::{self, MOST_BONES};
 
 /// Skin weights as CSR: row i of `indptr` (V+1) spans the influences of vertex i in `bones` and `values` (nnz).
@@ -50,15 +50,16 @@ impl Weights {
     /// The non-zero entries of a (V, n_bones) array.
     #[staticmethod]
     fn from_dense(py: Python<'_>, array: Matrix<'_, f32>) -> PyResult<Self> {
+        let n_bones = ranges::count("the number of columns", array.shape()[1] as i64, 0..=MOST_BONES)? as u32;
         let (mut indptr, mut bones, mut values) = (vec![0], Vec::new(), Vec::new());
         for row in array.as_array().rows() {
             for (bone, &value) in row.iter().enumerate().filter(|&(_, &value)| value != 0.0) {
                 bones.push(bone as u32);
                 values.push(value);
             }
-            indptr.push(bones.len() as u32);
+            let end = u32::try_from(bones.len());
+            indptr.push(end.map_err(|_| InvalidParameter::new_err("the array has more entries than can be counted"))?);
         }
-        let n_bones = ranges::count("the number of columns", array.shape()[1] as i64, 0..=MOST_BONES)? as u32;
         let weights = skinwright_core::Weights::new(indptr, bones, values, n_bones).map_err(to_python)?;
         Self::from_core(py, weights)
     }

@@ -23,7 +23,7 @@ from painting import look
 from sculpting import brush as sculpt_brush
 
 RIG, BODY, DRESS = "Rig", "Body", "Dress"
-SETTLE = 4.0
+SETTLE = 20.0
 
 
 class Listener(io.TextIOBase):
@@ -189,14 +189,20 @@ class Monkey:
     def rename(self) -> Steps:
         obj = brushes().target() if brushes() else None
         if obj:
-            obj.name = obj.name + "x" if len(obj.name) < 12 else BODY
+            self.call_it(obj, obj.name + "x" if len(obj.name) < 12 else BODY)
         yield 0.01
+
+    def call_it(self, obj: bpy.types.Object, name: str) -> None:
+        """As the outliner does it. Without the step Blender itself may crash when an older one looks for the name."""
+        obj.name = name
+        with self.window.context():
+            bpy.ops.ed.undo_push(message="Rename")
 
     def rename_back(self) -> Steps:
         for obj in bpy.data.objects:
             stem = next((stem for stem in (BODY, DRESS, RIG) if obj.name.startswith(stem)), None)
             if stem and stem not in bpy.data.objects:
-                obj.name = stem
+                self.call_it(obj, stem)
         yield 0
 
     def play(self) -> Steps:
@@ -292,6 +298,8 @@ class Monkey:
     }  # fmt: skip
 
     def choose(self) -> str:
+        if len(bpy.context.window_manager.windows) > 1 and self.random.random() < 0.08:
+            return "other_window"  # drawing two takes its time
         return self.random.choices(list(self.WEIGHTS), list(self.WEIGHTS.values()))[0]
 
     def settle(self) -> Steps:

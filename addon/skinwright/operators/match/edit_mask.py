@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...match import session as match_session
 from ...registration import registration
-from ...scene import mask, mesh, weight_state
+from ...scene import mask, mesh, object_state
 from ..base import SkinwrightOperator
 from .preview import begin, refusal, target
 
@@ -82,7 +82,7 @@ class SKINWRIGHT_OT_edit_match_mask(SkinwrightOperator):
 def _write(obj: Object, values: mask.Values) -> None:
     group = obj.skinwright.mask_group
     try:
-        with weight_state.all_or_nothing([obj]):
+        with object_state.all_or_nothing([obj]):
             mask.ensure(obj)
             mask.write(obj, values)
     except BaseException:

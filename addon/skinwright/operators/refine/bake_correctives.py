@@ -47,8 +47,6 @@ class SKINWRIGHT_OT_bake_correctives(LongWork, CorrectiveSettings, SkinwrightOpe
 
     def complete(self, _context: Context, report: correctives.CorrectiveReport) -> set[str]:
         """Say what was done."""
-        if self.filepath:
-            files.write_report(self._certificate(), report.to_json(), others=blend_file.opened())
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> "jobs.Jobs[correctives.CorrectiveReport]":
@@ -56,7 +54,10 @@ class SKINWRIGHT_OT_bake_correctives(LongWork, CorrectiveSettings, SkinwrightOpe
         params = self.to_params(preferences.threads(context))
         if self.filepath:
             files.check_output(self._certificate(), others=blend_file.opened(), replaces=files.REPORT)
-        return correctives.steps(obj, params, chosen_joints(context, obj))
+        return correctives.steps(obj, params, chosen_joints(context, obj), self._certify if self.filepath else None)
+
+    def _certify(self, report: correctives.CorrectiveReport) -> None:
+        files.write_report(self._certificate(), report.to_json(), others=blend_file.opened())
 
     def _certificate(self) -> Path:
         return Path(bpy.path.abspath(self.filepath))

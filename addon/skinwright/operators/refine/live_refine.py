@@ -1,10 +1,13 @@
 """Live Refinement: the preview on and off, kept up with the pose by handlers."""
 
+from collections.abc import Callable
+
 import bpy
 from bpy.app.handlers import persistent
 from bpy.types import Context
 
-from ... import preferences
+from ... import preferences, reporting
+from ...errors import sentence
 from ...refine import live
 from ...registration import registration
 from ...scene import armature
@@ -50,9 +53,19 @@ def _on_change(*_arguments: object) -> None:
     if live.current and not _busy:
         _busy = True
         try:
-            live.update()
+            _attempt(live.update)
         finally:
             _busy = False
+
+
+def _attempt(step: Callable[[], object]) -> None:
+    """Do it, or end the preview and say why: else every change of the pose would fail again."""
+    try:
+        step()
+    except Exception as error:
+        live.stop()
+        label = SKINWRIGHT_OT_live_refine.bl_label
+        reporting.remember(label, f"The preview has ended: {sentence(label, error)}", failed=True)
 
 
 @persistent
@@ -64,7 +77,7 @@ def _before_saving(*_arguments: object) -> None:
 @persistent
 def _on_return(*_arguments: object) -> None:
     """After saving, undo or redo."""
-    live.restart()
+    _attempt(live.restart)
 
 
 @persistent

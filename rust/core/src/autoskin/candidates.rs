@@ -183,9 +183,12 @@ impl<'a> Surface<'a> {
 }
 
 /// How much a bone faces the surface, 1 where it lies straight below it, given the cosine of the angle between the normal and
-/// the direction from the bone: what is beside or outside of the surface counts as farther away. (1 + cos) / 2 as it is
-/// leaves 5 % more error on the evaluation's humans, its plain square 15 % more on its animals.
+/// the direction from the bone: what is beside or outside of the surface counts as farther away. Half of it is flat near 1,
+/// so that of bones in a row, as of a spine, the nearest is taken and not the one that a slope points to; half is steeper,
+/// which keeps the thin limbs of animals to their own bones.
 fn facing(cosine: f64) -> f64 {
     let half = 0.5 * (1.0 + cosine);
-    0.15 + 0.85 * half * half
+    let steep = half * half;
+    let flat = (steep * (3.0 - 2.0 * half)).powi(3);
+    0.15 + 0.425 * (steep + flat)
 }

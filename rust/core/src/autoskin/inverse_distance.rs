@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use super::candidates::Candidates;
+use super::rows;
 use super::skeleton::Skeleton;
 use crate::mesh::TriMesh;
 use crate::weights::Weights;
@@ -44,8 +45,7 @@ fn weights(mesh: &TriMesh<'_>, skeleton: &Skeleton<'_>, distances: impl Fn(usize
         distances(i, near);
         near.iter_mut().for_each(|(_, distance)| *distance = distance.max(least));
         near.sort_by(|x, y| x.1.total_cmp(&y.1).then(x.0.cmp(&y.0)));
-        out.extend(blend(near, &joints, mesh.position(i as u32)).into_iter().map(|(bone, x)| (bone, x as f32)));
-        out.sort_by_key(|influence| influence.0);
+        rows::append(blend(near, &joints, mesh.position(i as u32)), out);
     };
     Weights::from_rows(mesh.vertex_count(), skeleton.len() as u32, Vec::new, row)
 }

@@ -3,22 +3,22 @@
 mod candidates;
 mod heat;
 mod inverse_distance;
-mod limit;
 mod report;
+mod rows;
 mod skeleton;
-mod weld;
 
 use crate::error::{Error, Result};
+use crate::limit::limit;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
+use crate::welded::Welded;
 
 pub use report::Report;
 pub use skeleton::Skeleton;
 
 use candidates::Candidates;
 use report::Clock;
-use weld::Welded;
 
 /// How weights are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +81,22 @@ pub struct AutoWeights {
 ///
 /// # Errors
 /// [`Error::InvalidSkeleton`], [`Error::InvalidParameter`], [`Error::Cancelled`], [`Error::NotPositiveDefinite`].
+///
+/// # Example
+/// ```
+/// use skinwright_core::autoskin::{Settings, Skeleton, automatic_weights};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (positions, triangles) = mesh(data("arm.obj"))?;
+/// let arm = TriMesh::new(&positions, &triangles, "arm")?;
+/// let segments = [[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+/// let skeleton = Skeleton { segments: &segments, parents: &[-1, 0] };
+/// let automatic = automatic_weights(&arm, &skeleton, &Settings::default(), &Progress::default())?;
+/// assert_eq!(automatic.report.unweighted, 0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn automatic_weights(
     mesh: &TriMesh<'_>,
     skeleton: &Skeleton<'_>,
@@ -92,8 +108,9 @@ pub fn automatic_weights(
     let mut clock = Clock::default();
     let welded = Welded::new(mesh);
     let vertices = mesh.vertex_count();
-    let mesh = TriMesh::new(&welded.positions, &welded.triangles, "rest")?;
-    let mut report = Report { vertices, distinct: welded.positions.len(), ..Report::default() };
+    let positions: Vec<[f32; 3]> = welded.first.iter().map(|&i| mesh.positions()[i as usize]).collect();
+    let mut report = Report { vertices, distinct: positions.len(), ..Report::default() };
+    let mesh = TriMesh::new(&positions, &welded.triangles, "rest")?;
     let weights = match settings.method {
         Method::Euclidean => inverse_distance::euclidean(&mesh, skeleton),
         method => {
@@ -106,7 +123,7 @@ pub fn automatic_weights(
         }
     };
     clock.lap("weights", &mut report);
-    let weights = welded.spread(limit::limit(&weights, settings.max_influences));
+    let weights = limit(weights, settings.max_influences).take_rows(&welded.of_vertex);
     report.count(&weights);
     progress.report(1.0);
     Ok(AutoWeights { weights, report })

@@ -45,6 +45,19 @@ pub struct Skeleton<'a> {
 ///
 /// # Errors
 /// [`Error::InvalidParameter`], [`Error::LengthMismatch`] if the inputs do not fit together.
+///
+/// # Example
+/// ```
+/// use skinwright_core::Weights;
+/// use skinwright_core::desparsify::{Method, Skeleton, desparsify};
+///
+/// // One vertex that follows the second of three bones in a chain.
+/// let weights = Weights::new(vec![0, 1], vec![1], vec![1.0], 3)?;
+/// let chain = Skeleton { parents: &[-1, 0, 1], segments: &[], locked: &[] };
+/// let more = desparsify(&weights, Method::Hop, 3, &chain, None)?;
+/// assert_eq!(more.row(0), (&[0, 1, 2][..], &[0.0, 1.0, 0.0][..]));
+/// # Ok::<(), skinwright_core::Error>(())
+/// ```
 pub fn desparsify(
     weights: &Weights,
     method: Method,

@@ -8,8 +8,9 @@ use crate::error::Result;
 use crate::inside::Winding;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
-use crate::registration::{Match, Welded};
+use crate::registration::Match;
 use crate::weights::Weights;
+use crate::welded::Welded;
 
 /// Joints closer than this share of the skeleton's size are one.
 const SAME_JOINT: f64 = 1e-4;
@@ -35,11 +36,19 @@ pub(super) struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    /// `moved` (U) are the vertices of `body` on the mesh, whose diagonal is `size`, `matches` (U) their points on it.
-    pub fn new(body: &'a Welded, weights: &'a Weights, moved: &[DVec3], matches: &[Match], size: f64) -> Self {
-        let mut areas = vec![0.0; body.positions.len()];
+    /// `positions` (U) are the vertices of `body` as they were before, `moved` (U) on the mesh, whose diagonal is `size`;
+    /// `matches` (U) are their points on it.
+    pub fn new(
+        body: &'a Welded,
+        positions: &'a [DVec3],
+        weights: &'a Weights,
+        moved: &[DVec3],
+        matches: &[Match],
+        size: f64,
+    ) -> Self {
+        let mut areas = vec![0.0; positions.len()];
         for t in &body.triangles {
-            let [a, b, c] = t.map(|i| body.positions[i as usize]);
+            let [a, b, c] = t.map(|i| positions[i as usize]);
             let third = (b - a).cross(c - a).length() / 6.0;
             t.iter().for_each(|&i| areas[i as usize] += third);
         }
@@ -51,7 +60,7 @@ impl<'a> Surface<'a> {
         // Where a match is trusted, the mesh itself is the place.
         let settled = |(at, &z): (&Match, &DVec3)| z.lerp(at.position, trust((at, &z)));
         let moved = matches.iter().zip(moved).map(settled).collect();
-        Self { positions: &body.positions, moved, areas, confidence, weights, first: &body.first, size }
+        Self { positions, moved, areas, confidence, weights, first: &body.first, size }
     }
 
     /// The share of each vertex (U) in a joint between some bones: what they have in common, or what lies around the joint if
@@ -72,7 +81,8 @@ impl<'a> Surface<'a> {
         if shares.iter().filter(|&&share| share > 0.0).count() >= 4 {
             return shares;
         }
-        let near = |(p, area): (&DVec3, &f64)| area / (p.distance_squared(joint) + 1e-8).powi(2);
+        let least = (1e-4 * self.size).powi(2);
+        let near = |(p, area): (&DVec3, &f64)| area / (p.distance_squared(joint) + least).powi(2);
         self.positions.iter().zip(&self.areas).map(near).collect()
     }
 

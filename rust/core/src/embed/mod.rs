@@ -1,7 +1,9 @@
 //! A skeleton into a mesh that has none.
 
+mod hierarchy;
 mod joints;
 mod medial;
+mod posed;
 mod report;
 mod template;
 
@@ -107,6 +109,25 @@ pub struct Embedding {
 ///
 /// # Errors
 /// [`Error::InvalidSkeleton`], [`Error::Cancelled`].
+///
+/// # Example
+/// ```
+/// use skinwright_core::embed::{Method, Template, embed_skeleton};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (positions, triangles) = mesh(data("arm.obj"))?;
+/// let arm = TriMesh::new(&positions, &triangles, "arm")?;
+/// let bones = Template {
+///     heads: &[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]],
+///     tails: &[[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]],
+///     parents: &[-1, 0],
+/// };
+/// let embedding = embed_skeleton(&arm, &bones, Method::Medial, &Progress::default())?;
+/// assert_eq!(embedding.heads.len(), 2);
+/// # Ok(())
+/// # }
+/// ```
 pub fn embed_skeleton(
     mesh: &TriMesh<'_>,
     template: &Template<'_>,

@@ -1,20 +1,23 @@
 //! A skeleton from a template character: mesh, weights and armature of another body.
 //!
-//! The template's surface is drawn onto the mesh (`registration`), and each joint goes where it lies relative to its own
-//! surface: an affine combination of the points around it, fixed on the template and evaluated on the mesh (`joints`). Then
-//! joints are made symmetric, and moved inside where the template's own are inside.
+//! The template's character is moved to the mesh, its limbs turned as the mesh's are (`posed`); its surface is drawn onto the
+//! mesh (`registration`); and each joint goes where it lies relative to its own surface: an affine combination of the points
+//! around it, fixed on the template and evaluated on the mesh (`joints`). Then joints are made symmetric, and moved inside
+//! where the template's own are inside.
 
 use std::time::Instant;
 
 use glam::DVec3;
 
 use super::joints::{Joints, Surface};
+use super::posed::Start;
 use super::{Embedding, Report, Template};
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
-use crate::registration::{Lengths, MatchPoints, Matching, Schedule, Welded, register};
+use crate::registration::{Lengths, Match, MatchPoints, Matching, Schedule, register};
 use crate::weights::Weights;
+use crate::welded::Welded;
 
 /// Distance that normals which differ by a unit count, and length over which they are smoothed, as shares of the size.
 const NORMAL: f64 = 0.05;
@@ -47,30 +50,38 @@ pub fn embed_from_character(
     donor: &Donor<'_>,
     progress: &Progress,
 ) -> Result<Embedding> {
-    let start = Instant::now();
+    let began = Instant::now();
     template.check()?;
     check(template, donor, mesh)?;
     let (body, target) = (Welded::new(&donor.mesh), Welded::new(mesh));
     let size = mesh.diagonal();
     let lengths = Lengths { normal: NORMAL * size, smoothing: SMOOTHING * size };
-    let placed = aligned(donor, &body, mesh);
-    let matching = Matching::new(&target, mesh.triangles(), &body, &placed, MatchPoints::Surface, lengths)?;
-    let moved = register(&matching, &body.triangles, placed, size, ROUNDS, (progress, (0.05, 0.8)))?;
+    let fit = |start: Start| Fit::new(start, &body, &target, mesh, lengths);
+    let mut best = fit(aligned(template, donor, &body, mesh))?;
+    if let Some(posed) = Start::posed(template, donor, &body, mesh, (progress, (0.0, 0.25)))? {
+        let posed = fit(posed)?;
+        if posed.gap < best.gap {
+            best = posed;
+        }
+    }
+    let Fit { matching, start, .. } = best;
+    let moved = register(&matching, &body.triangles, start.positions.clone(), size, ROUNDS, (progress, (0.25, 0.8)))?;
     let matches = matching.closest(&moved)?.0;
     progress.check()?;
-    let surface = Surface::new(&body, donor.weights, &moved, &matches, size);
-    let mut joints = Joints::new(template, &surface);
+    let surface = Surface::new(&body, &start.positions, donor.weights, &moved, &matches, size);
+    let placed = Template { heads: &start.heads, tails: &start.tails, parents: template.parents };
+    let mut joints = Joints::new(&placed, &surface);
     let symmetric = donor.mirror.is_some_and(|mirror| joints.make_symmetric(template, mirror));
     progress.report(0.9);
     let outside = joints.move_inside(template, donor, mesh, progress)?;
     progress.report(1.0);
     let report = Report {
-        places: surface.positions.len(),
+        places: body.positions.len(),
         main_joints: template.len(),
         symmetric,
         outside,
         penalty: 0.0,
-        seconds: start.elapsed().as_secs_f64(),
+        seconds: began.elapsed().as_secs_f64(),
     };
     let single = |points: &[DVec3]| points.iter().map(|p| p.as_vec3().to_array()).collect();
     Ok(Embedding { heads: single(&joints.heads), tails: single(&joints.tails), confidence: joints.confidence, report })
@@ -104,20 +115,40 @@ fn check(template: &Template<'_>, donor: &Donor<'_>, mesh: &TriMesh<'_>) -> Resu
     Ok(())
 }
 
-/// The template's positions where the mesh is: as large along the template's longest side, and in its middle.
-fn aligned(donor: &Donor<'_>, body: &Welded, mesh: &TriMesh<'_>) -> Vec<DVec3> {
+/// A start, and how well it fits.
+struct Fit<'a> {
+    matching: Matching<'a>,
+    start: Start,
+    /// Mean distance of a vertex from its match, which is farther away the less the normals agree.
+    gap: f64,
+}
+
+impl<'a> Fit<'a> {
+    fn new(start: Start, body: &'a Welded, target: &'a Welded, mesh: &TriMesh<'_>, lengths: Lengths) -> Result<Self> {
+        let points = MatchPoints::Surface;
+        let matching = Matching::new(target, mesh.triangles(), body, &start.positions, points, lengths)?;
+        let matches = matching.closest(&start.positions)?.0;
+        let gap = |(at, p): (&Match, &DVec3)| at.position.distance(*p) + lengths.normal * (1.0 - at.cosine);
+        let gap = matches.iter().zip(&start.positions).map(gap).sum();
+        Ok(Self { matching, start, gap })
+    }
+}
+
+/// The template's character where the mesh is: as large along the template's longest side, and in its middle, or where
+/// landmarks say.
+fn aligned(template: &Template<'_>, donor: &Donor<'_>, body: &Welded, mesh: &TriMesh<'_>) -> Start {
     let (from, to) = (extent(&donor.mesh), extent(mesh));
     let sides = (from.1 - from.0).to_array();
     let longest = (0..3).max_by(|&a, &b| sides[a].total_cmp(&sides[b])).expect("three axes");
     let scale = (to.1 - to.0).to_array()[longest] / sides[longest].max(f64::MIN_POSITIVE);
-    let (mut centre, mut place) = (0.5 * (from.0 + from.1), 0.5 * (to.0 + to.1));
+    let mut middles = [0.5 * (from.0 + from.1), 0.5 * (to.0 + to.1)];
     if donor.landmarks.len() >= 3 {
         let mean = |side: usize, mesh: &TriMesh<'_>| {
             donor.landmarks.iter().map(|pair| mesh.position(pair[side])).sum::<DVec3>() / donor.landmarks.len() as f64
         };
-        (centre, place) = (mean(0, &donor.mesh), mean(1, mesh));
+        middles = [mean(0, &donor.mesh), mean(1, mesh)];
     }
-    body.positions.iter().map(|&p| place + scale * (p - centre)).collect()
+    Start::as_it_is(template, donor, body, scale, middles)
 }
 
 /// Lowest and highest coordinates of the vertices that triangles use.

@@ -10,12 +10,12 @@
 //! factored again only if its unknowns, their confidences or l change. To solve a patch only, hold the rows around it: make
 //! every vertex outside of it `Fixed` and give its present row.
 
-pub mod block;
+mod block;
 mod blocks;
 mod constraint;
 mod filled;
 mod rows;
-pub mod system;
+mod system;
 
 pub use constraint::Constraint;
 pub use filled::Filled;
@@ -40,6 +40,30 @@ const FLOORS: [f64; 3] = [1e-4, 1e-3, LAST_FLOOR];
 const LAST_FLOOR: f64 = 1e-2;
 
 /// A mesh prepared for filling: topology, Laplacian and the factorisations of the problem posed last.
+///
+/// # Example
+/// A strip of four quads: its ends are known, the rest follows.
+/// ```
+/// use skinwright_core::Progress;
+/// use skinwright_core::fill::{Constraint, Fill, Row};
+///
+/// let positions: Vec<[f32; 3]> = (0..10).map(|i| [(i / 2) as f32, (i % 2) as f32, 0.0]).collect();
+/// let triangles = (0..4).flat_map(|k| [[2 * k, 2 * k + 2, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 1]]).collect();
+/// let mut fill = Fill::new(positions, triangles, None)?;
+/// let mut constraints = vec![Constraint::Free; 10];
+/// [0, 1, 8, 9].map(|i| constraints[i] = Constraint::Fixed);
+///
+/// let progress = Progress::default();
+/// let assembled = fill.assemble(constraints, 0.1, &progress)?;
+/// fill.factor(assembled, &progress)?;
+/// // Column 0 is 1 at the left end, column 1 at the right one.
+/// let given = |i: u32, row: &mut Row| row.push((u32::from(i >= 8), 1.0));
+/// let filled = fill.solve(&given, &progress)?;
+/// let mut middle = Row::new();
+/// filled.append_row(4, &mut middle);
+/// assert!(middle.iter().all(|(_, value)| (value - 0.5).abs() < 1e-9));
+/// # Ok::<(), skinwright_core::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Fill {
     weld: Option<Weld>,

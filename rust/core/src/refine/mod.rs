@@ -14,12 +14,14 @@ mod frame;
 mod joints;
 mod lattice;
 mod local;
+mod morton;
 mod node_weights;
 pub mod number;
 mod pairs;
 mod predictor;
 mod prepared;
 pub mod projection;
+mod region;
 mod report;
 mod settings;
 mod skeleton;
@@ -28,7 +30,6 @@ mod surface;
 
 use glam::{DAffine3, Vec3};
 
-use self::contact::Skin;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 use self::projection::Kernel;
@@ -41,6 +42,28 @@ use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
 
 /// A character prepared for refinement: any number of poses, in any order.
+///
+/// # Example
+/// An elbow bent by 120 degrees:
+/// ```
+/// use glam::{DAffine3, DQuat, DVec3};
+/// use skinwright_core::refine::{Quality, Refiner, Settings};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (positions, triangles) = mesh(data("arm.obj"))?;
+/// # let painted = weights(data("arm.weights"), positions.len())?;
+/// let arm = TriMesh::new(&positions, &triangles, "arm")?;
+/// let segments = [[[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+/// let settings = Settings { cell: Some(0.03), ..Settings::default() };
+/// let refiner = Refiner::new(&arm, &painted, &[-1, 0], &segments, settings, &Progress::default())?;
+/// let elbow = DAffine3::from_translation(DVec3::new(0.5, 0.0, 0.0));
+/// let bend = elbow * DAffine3::from_quat(DQuat::from_rotation_z(120f64.to_radians())) * elbow.inverse();
+/// let refined = refiner.solve(&[DAffine3::IDENTITY, bend], Quality::Live)?;
+/// assert_eq!(refined.len(), positions.len());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Refiner {
     prepared: Prepared,
@@ -134,7 +157,8 @@ impl Refiner {
         let mut place = vec![None; self.prepared.surface.len()];
         solution.moved.iter().for_each(|&(vertex, at)| place[vertex as usize] = Some(self.prepared.in_mesh(at)));
         for (position, &welded) in positions.iter_mut().zip(&self.prepared.surface.of_vertex) {
-            if let Some(at) = place[welded as usize] {
+            // A pose that mirrors or flattens a joint may have no answer there: skinning has one.
+            if let Some(at) = place[welded as usize].filter(|at| at.is_finite()) {
                 *position = at.to_array();
             }
         }
@@ -150,18 +174,17 @@ impl Refiner {
     /// Limb against limb, limb against torso: over the whole skin, once more.
     fn part_limbs(&self, positions: &mut [[f32; 3]]) {
         let surface = &self.prepared.surface;
-        let skin = Skin {
-            triangles: &surface.triangles,
-            names: &|t| t,
-            ring: &|i| surface.ring(i as usize),
-            is_free: &|_| true,
-        };
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
-        if self.prepared.contact.part(&skin, &mut places).is_empty() {
+        let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
-            *position = places[welded as usize].to_array();
+            let at = places[welded as usize];
+            if at.is_finite() {
+                *position = at.to_array();
+            }
         }
     }
 

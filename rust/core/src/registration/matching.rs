@@ -4,10 +4,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::smooth::Smoother;
-use super::welded::Welded;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::surface::{OrientedPoint, OrientedSurface};
+use crate::welded::Welded;
 
 /// What a match may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -6,14 +6,12 @@
 
 mod matching;
 mod smooth;
-mod welded;
 
 use glam::DVec3;
 
 pub use matching::MatchPoints;
 pub(crate) use matching::{Lengths, Match, Matching};
 use smooth::Smoother;
-pub(crate) use welded::Welded;
 
 use crate::error::Result;
 use crate::progress::Progress;

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::prepared::Placed;
-use crate::registration::Welded;
+use crate::welded::Welded;
 
 /// Confidence at which a match counts as reliable.
 pub(super) const RELIABLE: f64 = 0.5;

@@ -7,8 +7,8 @@ use super::rows::{Row, normalise};
 use crate::error::Result;
 use crate::fill::{Constraint, Fill};
 use crate::progress::Progress;
-use crate::registration::Welded;
 use crate::weights::Weights;
+use crate::welded::Welded;
 
 /// Smoothness length of the filling, as a share of the target's diagonal.
 const SMOOTHNESS: f64 = 0.05;

@@ -97,6 +97,29 @@ pub struct Report {
 /// [`Error::LengthMismatch`](crate::Error::LengthMismatch), [`Error::WeightNegative`](crate::Error::WeightNegative),
 /// [`Error::InvalidParameter`](crate::Error::InvalidParameter), [`Error::NoCommonBones`](crate::Error::NoCommonBones),
 /// [`Error::UnusableBone`](crate::Error::UnusableBone), [`Error::Cancelled`](crate::Error::Cancelled).
+///
+/// # Example
+/// The weights of an arm for an arm twice as large:
+/// ```
+/// use skinwright_core::retarget::{Character, Correspondence, Settings, Skeleton, retarget};
+/// use skinwright_core::{Progress, TriMesh};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (small, triangles) = mesh(data("arm.obj"))?;
+/// # let painted = weights(data("arm.weights"), small.len())?;
+/// let large: Vec<_> = small.iter().map(|p| p.map(|x| 2.0 * x)).collect();
+/// // Bones along x: the frame's columns are its axes, y along the bone, and its head.
+/// let bone = |x: f64| [[0.0, 1.0, 0.0, x], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+/// let of_small = Skeleton::new(&[bone(0.0), bone(0.5)], &[0.5, 0.5], "source")?;
+/// let of_large = Skeleton::new(&[bone(0.0), bone(1.0)], &[1.0, 1.0], "target")?;
+/// let source = Character { mesh: TriMesh::new(&small, &triangles, "source")?, skeleton: &of_small };
+/// let target = Character { mesh: TriMesh::new(&large, &triangles, "target")?, skeleton: &of_large };
+/// let pairs = Correspondence { bone_map: &[0, 1], source_parents: None, landmarks: &[] };
+/// let retargeted = retarget(source, &painted, target, pairs, &Settings::default(), &Progress::default())?;
+/// assert_eq!(retargeted.report.unweighted, 0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn retarget(
     source: Character<'_>,
     weights: &Weights,

@@ -12,10 +12,10 @@ use crate::adjacency::Islands;
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::registration::Welded;
 use crate::registration::{Lengths, Match, Matching};
 use crate::registration::{Schedule, register};
 use crate::weights::Weights;
+use crate::welded::Welded;
 
 /// Length over which normals are smoothed, as a share of the source's diagonal.
 const NORMAL_SMOOTHING: f64 = 0.02;

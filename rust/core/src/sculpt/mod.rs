@@ -52,6 +52,22 @@ impl Default for Options {
 /// A character prepared for strokes: rest positions, candidates, poses, and what each vertex was sculpted to in them.
 ///
 /// The members of a vertex (zero weights too) are its candidates; strokes never add or drop one.
+///
+/// # Example
+/// ```
+/// use glam::{DAffine3, DVec3};
+/// use skinwright_core::Weights;
+/// use skinwright_core::sculpt::{Options, SculptSolver};
+///
+/// // One vertex, bound to a bone that stays; the other bone may take it along.
+/// let weights = Weights::new(vec![0, 2], vec![0, 1], vec![1.0, 0.0], 2)?;
+/// let mut solver = SculptSolver::new(&[[0.0, 0.0, 0.0]], weights, &[], Options { passes: 50, ..Options::default() })?;
+/// let pose = solver.add_pose(vec![DAffine3::IDENTITY, DAffine3::from_translation(DVec3::X)], 1.0)?;
+/// let stroke = solver.stroke(pose, &[0], &[[0.25, 0.0, 0.0]])?;
+/// assert!(stroke.reachability > 0.99);
+/// assert!((solver.weights().row(0).1[1] - 0.25).abs() < 0.01);
+/// # Ok::<(), skinwright_core::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SculptSolver {
     rest: Vec<DVec3>,

@@ -2,21 +2,20 @@
 //! SIGGRAPH Asia 2023 Technical Communications, doi 10.1145/3610543.3626180).
 //!
 //! Match -> constraints -> fill -> smooth -> islands -> limit. Vertices near the source with agreeing normals copy its weights
-//! ([`matching`]); the others are solved for by the part [`fill`](crate::fill); parts without any match follow an
-//! [`IslandPolicy`]; then come optional [`smooth`]ing and a [`limit`] on influences. [`Inpainting`] keeps what can be used
+//! ([`MatchMethod`]); the others are solved for by the part [`fill`](crate::fill); parts without any match follow an
+//! [`IslandPolicy`]; then come optional smoothing and a limit on influences. [`Inpainting`] keeps what can be used
 //! again.
 
 mod detail;
 mod islands;
-pub mod limit;
-pub mod matching;
+mod matching;
 mod normals;
 mod pipeline;
 mod prepared;
 mod report;
 mod settings;
 mod small_islands;
-pub mod smooth;
+mod smooth;
 mod source;
 mod target;
 
@@ -54,6 +53,25 @@ pub struct Transfer {
 ///
 /// # Errors
 /// Those of [`Inpainting::new`] and [`Inpainting::solve`].
+///
+/// # Example
+/// A sleeve takes the weights of the arm in it:
+/// ```
+/// use skinwright_core::transfer::{Settings, Source, TargetMesh, transfer_weights};
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/read/mod.rs"));
+/// # fn main() -> Result<(), Box<dyn AnyError>> {
+/// # let (arm, arm_triangles) = mesh(data("arm.obj"))?;
+/// # let arm_weights = weights(data("arm.weights"), arm.len())?;
+/// # let (positions, triangles) = mesh(data("sleeve.obj"))?;
+/// let source = Source::new(&arm, arm_triangles, arm_weights)?;
+/// let sleeve = TargetMesh { positions, triangles, ..TargetMesh::default() };
+/// let transfer = transfer_weights(&source, sleeve, None, &Settings::default())?;
+/// assert_eq!(transfer.report.matched, transfer.report.vertices);
+/// let (bones, values) = transfer.weights.row(0);
+/// assert_eq!((bones, values), (&[0][..], &[1.0][..]));
+/// # Ok(())
+/// # }
+/// ```
 pub fn transfer_weights(
     source: &Source,
     target: TargetMesh,

@@ -5,12 +5,11 @@ use super::islands::Scene;
 use super::matching::{DISTANCE_REFERENCE, Terms};
 use super::report::{Report, Stages};
 use super::smooth::{push_normalised, region, smooth};
-use super::{
-    Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, limit, small_islands,
-};
+use super::{Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, small_islands};
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
 use crate::fill::{Constraint, Filled, Row};
+use crate::limit::limit;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weights::Weights;
@@ -120,7 +119,7 @@ pub(super) fn solve(
     let surface = prepared.target.fill.triangles_and_wires();
     let (weights, unmatched_islands) =
         scene(prepared, &problem, &surface).fill(weights, settings.island_policy, progress)?;
-    let weights = if settings.max_influences > 0 { limit::limit(weights, settings.max_influences) } else { weights };
+    let weights = limit(weights, settings.max_influences);
     stages.end("islands and limit");
     let seconds = prepared.preparation.iter().copied().chain(stages.into_seconds()).collect();
     let report = Report { unmatched_islands, rigid_islands, factored_blocks, seconds, ..report };

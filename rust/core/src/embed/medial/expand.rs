@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::super::{Embedding, Report, Template};
+use super::super::{Embedding, Report, Template, hierarchy};
 use super::Alignment;
 use super::discrete::Chosen;
 use super::reduced::Reduced;
@@ -77,8 +77,9 @@ pub(super) fn expand(
         report: Report::default(),
     };
     let all = Frame { from: alignment.from, to: alignment.to, rotation: DQuat::IDENTITY, scale: alignment.scale };
+    let parents = hierarchy::parents(template);
     for j in 0..template.len() {
-        let (frame, confidence) = frame_of(j, template, &placed, &mut frames, all);
+        let (frame, confidence) = frame_of(j, &parents, &placed, &mut frames, all);
         let (mut head, mut tail) = (frame.point(template.head(j)), frame.point(template.tail(j)));
         if let Some(bone) = &placed[j] {
             head = bone.after[0];
@@ -127,7 +128,7 @@ fn placed_bones(template: &Template<'_>, reduced: &Reduced, points: &Points, cho
 /// The frame of the bone, or of the nearest one above it that was placed.
 fn frame_of(
     j: usize,
-    template: &Template<'_>,
+    parents: &[Option<usize>],
     placed: &[Option<Placed>],
     frames: &mut [Option<(Frame, f32)>],
     all: Frame,
@@ -135,10 +136,10 @@ fn frame_of(
     if let Some(known) = frames[j] {
         return known;
     }
-    let found = match (&placed[j], template.parent(j)) {
+    let found = match (&placed[j], parents[j]) {
         (Some(bone), _) => (Frame::new(bone.before, bone.after, all.scale), bone.confidence),
         (None, Some(parent)) => {
-            let (frame, confidence) = frame_of(parent, template, placed, frames, all);
+            let (frame, confidence) = frame_of(parent, parents, placed, frames, all);
             (frame, HANGING * confidence)
         }
         (None, None) => (all, HANGING),

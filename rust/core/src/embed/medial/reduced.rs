@@ -2,59 +2,64 @@
 
 use glam::DVec3;
 
-use super::super::Template;
+use super::super::{Template, hierarchy};
 use crate::error::{Error, Result};
 
 /// A branch counts if it is at least this share of the longest way down from the root.
 const LEAST_BRANCH: f64 = 0.2;
 
+/// Branches whose lengths differ by less than this share of theirs are a pair.
+const TWINS: f64 = 1e-3;
+
 /// A branch or an extremity.
 #[derive(Debug, Clone)]
-pub(super) struct Joint {
+pub(in crate::embed) struct Joint {
     /// In the template's space.
-    pub(super) position: DVec3,
+    pub(in crate::embed) position: DVec3,
     /// The limb that leads here; none for the first joint, which is the root.
-    pub(super) limb: Option<Limb>,
+    pub(in crate::embed) limb: Option<Limb>,
     /// The bone whose head this is, or whose tail, at an extremity.
-    pub(super) bone: usize,
-    pub(super) is_extremity: bool,
+    pub(in crate::embed) bone: usize,
+    pub(in crate::embed) is_extremity: bool,
 }
 
 /// What leads to a joint.
 #[derive(Debug, Clone)]
-pub(super) struct Limb {
+pub(in crate::embed) struct Limb {
     /// Index of the joint where it starts.
-    pub(super) from: usize,
+    pub(in crate::embed) from: usize,
     /// Bones whose heads lie between the two joints, in order.
-    pub(super) bones: Vec<usize>,
+    pub(in crate::embed) bones: Vec<usize>,
     /// Where these heads lie, as shares of the length.
-    pub(super) shares: Vec<f64>,
-    pub(super) length: f64,
+    pub(in crate::embed) shares: Vec<f64>,
+    pub(in crate::embed) length: f64,
 }
 
 /// Parents come before children.
 #[derive(Debug)]
-pub(super) struct Reduced {
-    pub(super) joints: Vec<Joint>,
+pub(in crate::embed) struct Reduced {
+    pub(in crate::embed) joints: Vec<Joint>,
 }
 
 /// The hierarchy, and how long the longest way is from the head of each bone to the end of what hangs on it.
 struct Tree<'a> {
     template: &'a Template<'a>,
+    parents: Vec<Option<usize>>,
     children: Vec<Vec<usize>>,
     longest: Vec<f64>,
 }
 
 impl<'a> Tree<'a> {
     fn new(template: &'a Template<'a>) -> Self {
+        let parents = hierarchy::parents(template);
         let mut children = vec![Vec::new(); template.len()];
-        for j in 0..template.len() {
-            if let Some(parent) = template.parent(j) {
+        for (j, parent) in parents.iter().enumerate() {
+            if let Some(parent) = *parent {
                 children[parent].push(j);
             }
         }
-        let mut tree = Self { template, children, longest: vec![0.0; template.len()] };
-        let mut order: Vec<usize> = (0..template.len()).filter(|&j| template.parent(j).is_none()).collect();
+        let mut tree = Self { template, parents, children, longest: vec![0.0; template.len()] };
+        let mut order: Vec<usize> = tree.roots().collect();
         let mut k = 0;
         while k < order.len() {
             order.extend(&tree.children[order[k]]);
@@ -67,6 +72,10 @@ impl<'a> Tree<'a> {
         tree
     }
 
+    fn roots(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.parents.len()).filter(|&j| self.parents[j].is_none())
+    }
+
     /// Longest way from the head of `j` through its child `c`.
     fn below(&self, j: usize, c: usize) -> f64 {
         self.template.head(j).distance(self.template.head(c)) + self.longest[c]
@@ -76,21 +85,26 @@ impl<'a> Tree<'a> {
         self.children[j].iter().copied().filter(|&c| self.longest[c] >= least).collect()
     }
 
-    /// The child that the longest way from `j` goes through, or none if it ends at the tail of `j`.
+    /// The child that the longest way from `j` goes through, or none if it ends at the tail of `j`. Of a pair that is as long
+    /// on both sides, such as ears and eyes, neither continues the limb.
     fn deepest(&self, j: usize) -> Option<usize> {
         let own = self.template.head(j).distance(self.template.tail(j));
-        let deepest = self.children[j].iter().copied().max_by(|&a, &b| self.below(j, a).total_cmp(&self.below(j, b)));
-        deepest.filter(|&c| self.below(j, c) > own)
+        let has_twin = |c: usize| {
+            let close = |other: usize| (self.below(j, c) - self.below(j, other)).abs() < TWINS * self.below(j, c);
+            self.children[j].iter().any(|&other| other != c && close(other))
+        };
+        let alone = self.children[j].iter().copied().filter(|&c| self.below(j, c) > own && !has_twin(c));
+        alone.max_by(|&a, &b| self.below(j, a).total_cmp(&self.below(j, b)))
     }
 }
 
 impl Reduced {
     /// # Errors
     /// [`Error::InvalidSkeleton`] if the template has no extent.
-    pub(super) fn new(template: &Template<'_>) -> Result<Self> {
+    pub(in crate::embed) fn new(template: &Template<'_>) -> Result<Self> {
         let tree = Tree::new(template);
-        let roots = (0..template.len()).filter(|&j| template.parent(j).is_none());
-        let top = roots.max_by(|&a, &b| tree.longest[a].total_cmp(&tree.longest[b])).expect("parents end somewhere");
+        let top =
+            tree.roots().max_by(|&a, &b| tree.longest[a].total_cmp(&tree.longest[b])).expect("parents end somewhere");
         if tree.longest[top] == 0.0 {
             return Err(Error::InvalidSkeleton { reason: "all of its bones lie in one point".into() });
         }

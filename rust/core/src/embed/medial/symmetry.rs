@@ -73,7 +73,7 @@ impl Symmetry {
             _ => Side::Negative,
         };
         let side: Vec<Side> = joints.iter().enumerate().map(side).collect();
-        if side.iter().all(|&side| side == Side::Plane) {
+        if side.iter().all(|&side| side == Side::Plane) || !keeps_limbs(reduced, &joint_image, &side) {
             return None;
         }
         let used = || mesh.triangles().as_flattened().iter().map(|&i| mesh.position(i)[axis]);
@@ -122,6 +122,13 @@ impl Symmetry {
             _ => Side::Negative,
         }
     }
+}
+
+/// Whether limbs are mapped to limbs, and none crosses the plane: a chain along the axis is its own image, but turned about.
+fn keeps_limbs(reduced: &Reduced, image: &[usize], side: &[Side]) -> bool {
+    let from = |k: usize| reduced.joints[k].limb.as_ref().map(|limb| limb.from);
+    let crosses = |k: usize| side[k] == Side::Positive && from(k).is_some_and(|k| side[k] == Side::Negative);
+    (0..image.len()).all(|k| from(k).map(|from| image[from]) == from(image[k]) && !crosses(k))
 }
 
 fn nearest(points: &[DVec3], to: DVec3) -> Option<(usize, f64)> {

@@ -9,15 +9,18 @@ use crate::surface::squared_distance_to_triangle;
 /// Neighbouring triangles or vertices that share a box. Files list neighbours near each other, mostly.
 const RUN: usize = 64;
 
-/// More comparisons of boxes than this cost as much as an index of everything.
+/// More comparisons of boxes than this cost as much as an index of everything, ...
 const MOST_COMPARISONS: usize = 20_000_000;
+/// ... and so do the comparisons of vertices and triangles of one run of an island with so many runs of triangles.
+const RUNS_PER_GAP: usize = 8;
 
 /// Those of the `solved` triangles that can be nearest to one of `islands` (lists of vertices), ascending; all if it does
 /// not pay to choose.
 pub(super) fn can_be_nearest(mesh: &TriMesh<'_>, solved: Vec<u32>, islands: &[&[u32]]) -> Vec<u32> {
     let runs_of_vertices: usize = islands.iter().map(|island| island.len().div_ceil(RUN)).sum();
     let runs: Vec<&[u32]> = solved.chunks(RUN).collect();
-    if runs_of_vertices.saturating_mul(runs.len()) > MOST_COMPARISONS {
+    let costs_more = runs_of_vertices.saturating_mul(runs.len()) > MOST_COMPARISONS;
+    if costs_more || runs.len() < runs_of_vertices.saturating_mul(RUNS_PER_GAP) {
         return solved;
     }
     let position = |i: u32| mesh.positions()[i as usize];
@@ -25,8 +28,9 @@ pub(super) fn can_be_nearest(mesh: &TriMesh<'_>, solved: Vec<u32>, islands: &[&[
     let boxes: Vec<Bounds> = runs.par_iter().map(|run| Bounds::of(run.iter().flat_map(corners))).collect();
     let mark = |mut wanted: Vec<bool>, island: &&[u32]| {
         let parts: Vec<Bounds> = island.chunks(RUN).map(|part| Bounds::of(part.iter().map(|&i| position(i)))).collect();
+        // Not by the boxes' gap: that of a run from one end of the garment to the other is small anywhere.
         let nearest = |part: &Bounds| {
-            let distances = boxes.iter().map(|b| b.distance(part)).enumerate();
+            let distances = boxes.iter().map(|b| b.farthest(part)).enumerate();
             distances.min_by(|a, b| a.1.total_cmp(&b.1)).expect("something is solved")
         };
         let candidates = parts.iter().enumerate().map(|(k, part)| (k, nearest(part)));

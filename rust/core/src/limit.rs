@@ -1,10 +1,11 @@
-//! Step 4, optional: at most k influences a vertex, as exporters ask for.
+//! At most k influences per vertex, as exporters ask for.
 
 use crate::weights::Weights;
 
-/// Keeps the `max_influences` largest influences of each row (ties: the lower bone) and renormalises what is kept.
+/// Keeps the `max_influences` largest influences of each row (ties: the lower bone) and renormalises those rows that had
+/// more; 0 keeps all.
 pub fn limit(weights: Weights, max_influences: usize) -> Weights {
-    if weights.indptr().windows(2).all(|w| (w[1] - w[0]) as usize <= max_influences) {
+    if max_influences == 0 || weights.indptr().windows(2).all(|w| (w[1] - w[0]) as usize <= max_influences) {
         return weights;
     }
     Weights::from_rows(

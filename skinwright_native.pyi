@@ -1,0 +1,1 @@
+rust/native/skinwright_native.pyi

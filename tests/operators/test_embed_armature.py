@@ -1,0 +1,204 @@
+"""An armature for a mesh that has none: joints, what is made and what stays, the command, three presses in a row."""
+
+import json
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import builders
+import doll
+import figure
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+
+pytestmark = pytest.mark.usefixtures("native", "scene")
+SCRIPT = Path(__file__).resolve().parents[2] / "blender_scripts" / "embed_armature.py"
+HEIGHT = 1.8
+
+
+def bare(name, arm_length=0.7, lift=0.0):
+    return builders.mesh(name, *doll.figure(arm_length, lift))
+
+
+@pytest.fixture
+def man(scene):
+    """A doll in a T pose with bones and weights, away from the middle."""
+    ends = doll.skeleton()
+    parents = [doll.NAMES[p] if p >= 0 else None for p in doll.PARENTS]
+    named = zip(doll.NAMES, ends, parents, strict=True)
+    rig = figure.bones({name: (*segment.tolist(), parent) for name, segment, parent in named}, "Man Rig")
+    body = bare("Man")
+    rig.location = body.location = (3, 0, 0)
+    bpy.context.view_layer.update()
+    builders.select(body, rig)
+    assert bpy.ops.skinwright.automatic_weights(resolution=64) == {"FINISHED"}
+    scene.skinwright.retarget.source = rig
+    return rig
+
+
+def heads(rig):
+    return np.array([rig.matrix_world @ rig.data.bones[name].head_local for name in doll.NAMES])
+
+
+def embed(obj, **settings):
+    builders.select(obj)
+    assert bpy.ops.skinwright.embed_armature(**settings) == {"FINISHED"}
+    return next(m.object for m in obj.modifiers if m.type == "ARMATURE")
+
+
+@pytest.mark.parametrize("method", ["TEMPLATE", "MEDIAL"])
+@pytest.mark.parametrize("arm_length, lift", [(0.6, 0.0), (0.7, -0.45)], ids=["T", "A"])
+def test_joints_lie_where_they_belong(man, method, arm_length, lift):
+    """Also if the template stands in a T pose and the mesh in an A pose."""
+    child = bare("Child", arm_length, lift)
+    rig = embed(child, method=method)
+    off = np.linalg.norm(heads(rig) - doll.skeleton(arm_length, lift)[:, 0], axis=1) / HEIGHT
+    assert off.max() < 0.06 and off.mean() < 0.03, dict(zip(doll.NAMES, off.round(3).tolist(), strict=True))
+    left = [name.endswith(".L") for name in doll.NAMES]
+    right = [name.endswith(".R") for name in doll.NAMES]
+    assert (heads(rig)[left, 0] > 0.03).all() and (heads(rig)[right, 0] < -0.03).all()
+    np.testing.assert_allclose(heads(rig)[left] * [-1, 1, 1], heads(rig)[right], atol=0.02)
+
+
+def test_nothing_that_is_there_is_changed(man):
+    body, before = bpy.data.objects["Man"], heads(man)
+    weights = builders.dense(body, doll.NAMES)
+    child = bare("Child", 0.6)
+    positions = figure.rest(child)
+    rig = embed(child)
+    assert rig.name == "Child Rig" and rig.data != man.data
+    np.testing.assert_array_equal(heads(man), before)
+    np.testing.assert_array_equal(builders.dense(body, doll.NAMES), weights)
+    np.testing.assert_array_equal(figure.rest(child), positions)
+    assert not child.vertex_groups and child.parent is None
+    confidence = [bone["skinwright_confidence"] for bone in rig.pose.bones]
+    assert len(confidence) == len(doll.NAMES) and 0 < min(confidence) <= max(confidence) <= 1
+    assert [bone.parent.name if bone.parent else None for bone in rig.data.bones] == [
+        bone.parent.name if bone.parent else None for bone in man.data.bones
+    ]
+    other = embed(bare("Unbound", 0.6), bind=True)
+    assert other != rig
+
+
+def test_refusals_are_sentences_and_make_nothing(man):
+    objects = set(bpy.data.objects)
+    flat = bpy.data.objects.new("Flat", bpy.data.meshes.new("Flat"))
+    bpy.context.collection.objects.link(flat)
+    builders.select(flat)
+    with pytest.raises(RuntimeError, match="Flat has no faces"):
+        bpy.ops.skinwright.embed_armature()
+    bpy.data.objects.remove(flat)
+    child = bare("Child", 0.6)
+    child.data.vertices[3].co.z = float("inf")
+    builders.select(child)
+    with pytest.raises(RuntimeError, match="Child has a coordinate that is not a number at vertex 3"):
+        bpy.ops.skinwright.embed_armature()
+    bpy.data.objects.remove(child)
+    bpy.data.objects["Man"].vertex_groups.clear()
+    builders.select(bare("Child", 0.6))
+    with pytest.raises(RuntimeError, match="deforms no mesh that has weights"):
+        bpy.ops.skinwright.embed_armature()
+    bpy.data.objects.remove(bpy.data.objects["Child"])
+    assert set(bpy.data.objects) == objects
+
+
+def test_the_script_does_what_the_operator_does(addon, man, tmp_path):
+    child = bare("Child", 0.6)
+    blend, out, report = (tmp_path / name for name in ("in.blend", "out.blend", "report.json"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    expected = heads(embed(child))
+    arguments = ["--source", "Man Rig", "--target", "Child", "--save", str(out), "--report", str(report)]
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), str(blend), *arguments], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Child Rig: 11 bones placed" in done.stdout
+    assert json.loads(report.read_text())["meshes"] == ["Child"]
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    np.testing.assert_array_equal(heads(bpy.data.objects["Child Rig"]), expected)
+    assert addon.headless.command_line.main(["embed", "--source", "Man Rig", "--target", "Nobody"]) == 1
+    assert addon.headless.command_line.main(["embed", "--source", "Man", "--target", "Child", "--bind", "false"]) == 0
+
+
+def test_three_presses_take_a_bare_mesh_to_a_pose(man):
+    """Embed, weights, refine: then a bent knee keeps its sides apart and its thickness."""
+    child = bare("Child", 0.6, -0.3)
+    builders.select(child)
+    assert bpy.ops.skinwright.embed_armature() == {"FINISHED"}
+    assert bpy.ops.skinwright.automatic_weights() == {"FINISHED"}
+    rig = next(m.object for m in child.modifiers if m.type == "ARMATURE")
+    rest = figure.rest(child)
+    figure.turn(rig, "shin.L", 90)
+    builders.select(child)
+    plain = figure.shown(child)
+    knee = heads(rig)[doll.NAMES.index("shin.L")]
+    bpy.context.view_layer.objects.active = child
+    assert bpy.ops.skinwright.bake_correctives(samples=3) == {"FINISHED"}
+    refined = figure.shown(child)
+    other_leg = (rest[:, 0] < -0.02) & (rest[:, 2] < 0.8)
+    foot = (rest[:, 0] > 0.02) & (rest[:, 2] < 0.1)
+    for shown in (plain, refined):
+        assert np.isfinite(shown).all()
+        assert np.abs(shown - rest)[other_leg].max() < 0.01
+        assert np.linalg.norm(shown - rest, axis=1)[foot].min() > 0.3
+    near = (np.linalg.norm(rest - knee, axis=1) < 0.12) & (rest[:, 0] > 0.02)
+    assert near.any() and np.linalg.norm(refined - plain, axis=1)[near].max() > 1e-3
+    assert child.data.shape_keys and len(child.data.shape_keys.key_blocks) > 1
+
+
+@pytest.fixture
+def arm(scene):
+    """A limb 1.5 times as long as that of the donor, which is the source, and without an armature."""
+    _, rig = builders.limb("Donor", around=12, along=16)
+    obj, own = builders.limb("Arm", around=12, along=16, length=3.0, bound=False)
+    bpy.data.objects.remove(own)
+    bpy.data.armatures.remove(bpy.data.armatures["Arm Rig"])
+    scene.skinwright.retarget.source = rig
+    builders.select(obj)
+    return obj
+
+
+def everything():
+    return sorted(o.name for o in bpy.data.objects), sorted(a.name for a in bpy.data.armatures), bpy.context.mode
+
+
+@pytest.mark.parametrize("method", ["TEMPLATE", "MEDIAL"])
+def test_bones_are_in_the_limb(arm, method):
+    assert bpy.ops.skinwright.embed_armature(method=method) == {"FINISHED"}
+    rig = bpy.data.objects["Arm Rig"]
+    assert [(m.type, m.object) for m in arm.modifiers] == [("ARMATURE", rig)]
+    joint = np.array(rig.data.bones["Lower"].head_local)
+    assert -0.1 < joint[0] < 3.1 and np.linalg.norm(joint[1:]) < 0.1
+    if method == "TEMPLATE":
+        assert joint[0] == pytest.approx(1.5, abs=0.1)
+    assert bpy.context.view_layer.objects.active == arm and arm.select_get()
+
+
+def test_it_is_bound_on_demand_only(arm):
+    bpy.ops.skinwright.embed_armature(bind=False)
+    assert not arm.modifiers and "Arm Rig" in bpy.data.objects
+
+
+@pytest.mark.parametrize(
+    "module, name", [("scene.embedded", "mark"), ("scene.embedded", "_place"), ("embed", "EmbedReport")]
+)
+def test_nothing_is_left_if_it_fails(addon, arm, monkeypatch, module, name):
+    def fails(*_arguments, **_named):
+        raise OSError("injected")
+
+    monkeypatch.setattr(import_module(f"{addon.__name__}.{module}"), name, fails)
+    before = everything()
+    with pytest.raises(RuntimeError, match="Embed Armature"):
+        bpy.ops.skinwright.embed_armature()
+    assert everything() == before and not arm.modifiers
+
+
+def test_a_template_without_weights_is_refused(arm):
+    bpy.data.objects["Donor"].vertex_groups.clear()
+    before = everything()
+    with pytest.raises(RuntimeError, match="Donor Rig deforms no mesh that has weights"):
+        bpy.ops.skinwright.embed_armature(method="TEMPLATE")
+    assert everything() == before
