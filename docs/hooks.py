@@ -11,6 +11,19 @@ ADDON = ROOT / "addon" / "skinwright"
 STUB = ROOT / "rust" / "native" / "skinwright_native.pyi"
 # What the artist calls features whose folders have another name.
 TITLES = {"autoskin": "Automatic Weights", "desparsify": "Add Bone Slots", "embed": "Embed Armature"}
+# What is raised with a sentence for the artist.
+REFUSALS = {
+    "FileError",
+    "ManifestError",
+    "NativeError",
+    "RecordError",
+    "Refused",
+    "SceneError",
+    "SettingError",
+    "StoredError",
+    "TooLarge",
+    "Unsound",
+}
 # Parts of expressions that say nothing to a reader.
 NAMELESS = {"name", "self", "obj", "data", "join", "len", "str", "r", "f", "s"}
 
@@ -57,10 +70,11 @@ def messages() -> str:
 
 
 def sentences(path: Path) -> list[str]:
-    """The texts of all SceneErrors that a file raises; what is filled in at run time is shown as a word in italics."""
+    """The texts of all refusals that a file raises; what is filled in at run time is shown as a word in italics."""
     found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "SceneError" and node.args:
+        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+        if name in REFUSALS and node.args:
             text = plain(node.args[0])
             if text and len(text) > 20:
                 found.append(text)

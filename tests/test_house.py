@@ -14,7 +14,7 @@ ADDON = ROOT / "addon" / "skinwright"
 MODULES = sorted(p.relative_to(ADDON) for p in ADDON.rglob("*.py") if "presets" not in p.relative_to(ADDON).parts)
 
 # ui -> operators (by bl_idname) -> features, settings -> scene, native -> the wheel.
-FLOOR = {"csr", "declared", "errors", "files", "jobs", "native", "reporting", "scene", "soundness"}
+FLOOR = {"csr", "declared", "errors", "files", "jobs", "memory", "native", "reporting", "scene", "soundness"}
 # A feature may import the floor, and of the other features only these.
 FEATURES = {
     "transfer": set(),
@@ -35,7 +35,7 @@ MAY_IMPORT = {
     "registration": set(),
     "declared": {"errors"},
     "files": {"errors"},
-    "memory": set(),
+    "memory": {"errors"},
     "native": {"csr", "errors", "memory"},
     "reporting": {"csr"},
     "soundness": {"csr", "errors"},
@@ -44,7 +44,7 @@ MAY_IMPORT = {
     "jobs": {"csr", "errors", "native"},
     **{feature: FLOOR | others for feature, others in FEATURES.items()},
     "settings": {"declared", "errors"} | set(FEATURES),
-    "preferences": {"declared", "native", "registration", "settings"},
+    "preferences": {"declared", "memory", "native", "registration", "settings"},
     "overlay": FLOOR | {"check", "match", "stored", "transfer"},
     "operators": FLOOR | set(FEATURES) | {"settings", "preferences", "registration"},
     "ui": FLOOR - {"scene"} | set(FEATURES) | {"settings", "registration"},

@@ -12,8 +12,9 @@ ADDON, CORE = ROOT / "addon" / "skinwright", ROOT / "rust" / "core" / "src"
 
 # From the ground up; a part imports only from floors below its own, and on its own floor what the next line allows.
 ADDON_FLOORS = [
-    {"csr", "errors", "memory", "registration"},
-    {"declared", "files", "native", "reporting", "soundness"},
+    {"csr", "errors", "registration", "translations"},
+    {"declared", "files", "memory", "reporting", "soundness"},
+    {"native"},
     {"jobs", "scene"},
     {
         "transfer",

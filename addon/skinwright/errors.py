@@ -8,6 +8,15 @@ class Refused(ValueError):
     """One sentence for the artist: the object, the problem and the cure. Raised before anything is written."""
 
 
+def sentence(label: str, error: BaseException) -> str:
+    """What the artist reads of an error; `label` names the work that it has stopped."""
+    if isinstance(error, Refused):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f"{label}: {error.strerror}: {error.filename}" if error.filename else f"{label}: {error.strerror}"
+    return f"{label}: {internal(error)}"
+
+
 def internal(error: BaseException) -> str:
     """The sentence for an error nobody foresaw; its traceback goes to stderr, where a report of the bug needs it."""
     traceback.print_exception(error, file=sys.stderr)

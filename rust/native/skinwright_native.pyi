@@ -75,6 +75,7 @@ class TransferSettings(TypedDict, total=False):
     `max_distance`, or `relative_max_distance` times the target's bounding-box diagonal (or 30 % of the source's if
     that is larger): largest distance of a match; the report has the one in force.
     `max_normal_angle`: largest angle between the normals of a match; `match_flipped_normals`: opposite ones match too.
+    `average_ties`: a vertex equally near to several places takes the mean of those whose normals agree best.
     `mask` (V,): 0 inpaint, 1 automatic, 2 force match. `relative_weld_tolerance` times the target's diagonal: vertices
     that close are one, and get one row; 0 for none. `smoothness_length`, or `relative_smoothness_length` times the
     source's diagonal: l of the energy S + l^2 S M^-1 S (paper section 3.2), 0 for the harmonic solution.
@@ -89,6 +90,7 @@ class TransferSettings(TypedDict, total=False):
     relative_max_distance: float
     max_normal_angle: float
     match_flipped_normals: bool
+    average_ties: bool
     mask: ArrayLike | None
     relative_weld_tolerance: float
     smoothness_length: float | None
@@ -171,6 +173,7 @@ def transfer_weights(
     relative_max_distance: float = 0.05,
     max_normal_angle: float = 0.6108652381980153,
     match_flipped_normals: bool = True,
+    average_ties: bool = False,
     mask: ArrayLike | None = None,
     relative_weld_tolerance: float = 1e-06,
     smoothness_length: float | None = None,

@@ -53,6 +53,36 @@ def dress(rng):
     return body, garments
 
 
+def characters(rng):
+    """One to three limbs on a rig, and a donor with another, with the odd thing wrong. Returns (donor mesh, limbs)."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    donor, rig = builders.limb("Donor", bones=("Upper.L", "Lower.L", "Hand.L")[: int(rng.integers(1, 4))])
+    bones = ("Upper.L", "Lower.L", "Hand.L")[: int(rng.integers(1, 4))]
+    limbs = []
+    for number in range(int(rng.integers(1, 4))):
+        shape = {"around": int(rng.integers(3, 9)), "along": int(rng.integers(2, 9)), "length": rng.uniform(0.5, 5)}
+        obj, own = builders.limb(f"Limb {number}", bones=bones, bound=bool(rng.random() < 0.7), **shape)
+        if rng.random() < 0.5 and number:
+            for modifier in obj.modifiers:
+                modifier.object = bpy.data.objects["Limb 0 Rig"]
+        own.pose.bones[0].rotation_mode = "XYZ"
+        own.pose.bones[0].rotation_euler = rng.normal(size=3) * (rng.random() < 0.4)
+        if rng.random() < 0.1:
+            own.scale = rng.choice([-1, 0, 1, 2], 3)
+        limbs.append(obj)
+        if rng.random() < 0.4:
+            spoil(obj, rng)
+    if rng.random() < 0.15:
+        spoil(donor, rng)
+    settings = bpy.context.scene.skinwright
+    settings.retarget.source = rig if rng.random() < 0.9 else None
+    settings.transfer.source = donor
+    builders.select(*[obj for obj in limbs if obj.visible_get()])
+    bpy.context.scene.frame_end = int(rng.integers(1, 4))
+    bpy.context.view_layer.update()
+    return donor, limbs
+
+
 def spoil(obj, rng):
     """Sometimes one of what real files have."""
     match int(rng.integers(16)):
@@ -95,3 +125,46 @@ def check_sound(objects, before):
         if state.digest() != before.get(obj.name):
             assert np.isfinite(state.values).all(), f"{obj.name} has a weight that is not a number"
             assert state.values.min(initial=0) >= 0 and state.values.max(initial=0) <= 1 + 1e-6, obj.name
+
+
+def state(folder):
+    """Everything that an operation may write: objects, weights, shapes, keys, drivers, modifiers, colors, and the files
+    in a folder by name."""
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+    shapes = {}
+    for obj in meshes:
+        keys = obj.data.shape_keys
+        blocks = {} if keys is None else {key.name: coordinates(key.data) for key in keys.key_blocks}
+        animated = keys.animation_data if blocks else None
+        drivers = [curve.driver.expression for curve in animated.drivers] if animated else []
+        colors = [attribute.name for attribute in obj.data.attributes if attribute.data_type == "FLOAT_COLOR"]
+        marks = (sorted({*obj.keys()} - {"skinwright"}), obj.skinwright.mask_group)
+        shapes[obj.name] = (coordinates(obj.data.vertices), blocks, drivers, colors, marks)
+    follows = {
+        obj.name: (
+            [(m.name, m.type, m.show_viewport) for m in obj.modifiers],
+            [constraint.mute for constraint in obj.constraints],
+            (obj.parent and obj.parent.name, obj.parent_type, obj.parent_bone, str(obj.matrix_basis)),
+        )
+        for obj in bpy.data.objects
+    }
+    lists = [sorted(item.name for item in getattr(bpy.data, kind)) for kind in ("meshes", "armatures", "shape_keys")]
+    return digests(meshes), shapes, follows, lists, sorted(os.listdir(folder)), bpy.context.mode
+
+
+def coordinates(points):
+    found = np.empty(3 * len(points), np.float32)
+    points.foreach_get("co", found)
+    return found.tobytes()
+
+
+def differing(before, after):
+    """Which parts of the state, and for which object."""
+    parts = ("weights", "shapes", "follows", "data", "files", "mode")
+    found = []
+    for part, one, other in zip(parts, before, after, strict=True):
+        if one != other and isinstance(one, dict):
+            found += [f"{part} of {name}" for name in sorted({*one, *other}) if one.get(name) != other.get(name)]
+        elif one != other:
+            found.append(part)
+    return ", ".join(found)

@@ -46,8 +46,11 @@ class Blender:
         timeout: float = 150.0,
         size: tuple[int, int] = (1000, 700),
         real_mouse: bool = False,
+        files: tuple[Path, ...] = (),
     ) -> dict:
         """Runs `in_blender/<script>.py` in a window and returns its record; fails the test with the log otherwise.
+
+        `files` are put beside the script's folder, where it finds them as SHARE / name.
 
         Blender takes either simulated events or those of the virtual screen (`real_mouse`, in_blender/mouse.py).
         """
@@ -55,6 +58,8 @@ class Blender:
         with tempfile.TemporaryDirectory(prefix="skinwright-", dir=parent) as folder, self.screen(size) as display:
             share = Path(folder)
             lay_out(share)
+            for file in files:
+                shutil.copy(file, share)
             flags = ["--factory-startup", "--python-exit-code", "9"]
             if not real_mouse:
                 flags.append("--enable-event-simulate")

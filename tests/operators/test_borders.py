@@ -203,14 +203,40 @@ class TestMirror:
         plain(leg, boot, source_scope="OBJECT")
         assert rows_of(boot)[:, [1, 2]].sum(1).min() > 0.95
 
-    def test_a_mirror_that_cuts_or_comes_after_the_pose_completes_nothing(self, plain, body, addon):
-        skirt, half = self.half()
-        half.modifiers["Mirror"].use_bisect_axis[0] = True
-        reflections = addon.scene.mirror.reflections
-        assert reflections(half, np.eye(4)) == []
+    @pytest.mark.parametrize("side", [1, -1])
+    def test_a_mirror_that_cuts_completes_what_has_nothing_to_be_cut_off(self, plain, body, addon, side):
+        skirt = figure.skirt()
+        half = figure.part(skirt, "Half", lambda centre: side * centre[0] > 0)
+        modifier = half.modifiers.new("Mirror", "MIRROR")
+        modifier.use_bisect_axis[0], modifier.use_bisect_flip_axis[0] = True, side < 0
+        plain(body, half)
+        plain(body, skirt)
+        whole, _ = at_places(skirt)
+        own, _ = at_places(half)
+        assert max(np.abs(row - whole[at]).max() for at, row in own.items()) < 0.02
+        skirt.modifiers.new("Mirror", "MIRROR").use_bisect_axis[0] = True
+        assert addon.scene.mirror.reflections(skirt, np.eye(4), figure.rest(skirt)) == []
+
+    def test_a_mirror_after_the_pose_completes_nothing(self, body, addon):
+        skirt = figure.skirt()
         skirt.modifiers.new("Armature", "ARMATURE").object = body.modifiers[0].object
         skirt.modifiers.new("Mirror", "MIRROR")
-        assert reflections(skirt, np.eye(4)) == []
+        assert addon.scene.mirror.reflections(skirt, np.eye(4), figure.rest(skirt)) == []
+
+    def test_front_and_back_follow_the_same_bones(self, plain, body):
+        """A mirror along Y exchanges no sides: with its groups kept it completes, with them flipped it is named."""
+        skirt = figure.skirt()
+        front = figure.part(skirt, "Front", lambda centre: centre[1] < 0)
+        modifier = front.modifiers.new("Mirror", "MIRROR")
+        modifier.use_axis, modifier.use_mirror_vertex_groups = (False, True, False), False
+        assert plain(body, front).all_warnings() == []
+        plain(body, skirt)
+        whole, _ = at_places(skirt)
+        own, _ = at_places(front)
+        assert max(np.abs(row - whole[at]).max() for at, row in own.items()) < 0.02
+        modifier.use_mirror_vertex_groups = True
+        said = " ".join(plain(body, front).all_warnings())
+        assert "Mirror of Front exchanges left and right in a copy that lies on the same side" in said
 
     def test_two_axes(self, addon):
         """A quarter becomes four, each place once."""
@@ -219,7 +245,8 @@ class TestMirror:
             vertex.co.x, vertex.co.y = vertex.co.x + 1, vertex.co.y + 1
         half.modifiers.new("Mirror", "MIRROR").use_axis = (True, True, False)
         geometry = addon.scene.mesh.read(half)
-        completed = addon.transfer.completion.complete(geometry, addon.scene.mirror.reflections(half, np.eye(4)))
+        reflections = addon.scene.mirror.reflections(half, np.eye(4), geometry.positions)
+        completed = addon.transfer.completion.complete(geometry, reflections)
         positions = completed.geometry.positions
         assert len(positions) == len(np.unique(positions, axis=0)) == 81
         assert len(completed.geometry.triangles) == 4 * len(geometry.triangles)

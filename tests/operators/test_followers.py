@@ -82,6 +82,64 @@ def hook(boot, rig, body):
     modifier.vertex_indices_set(range(len(boot.data.vertices)))
 
 
+def socket(rig):
+    """An empty on the shin."""
+    empty = bpy.data.objects.new("Socket", None)
+    bpy.context.collection.objects.link(empty)
+    empty.parent, empty.parent_type, empty.parent_bone = rig, "BONE", "Shin.L"
+    bpy.context.view_layer.update()
+    return empty
+
+
+def hook_on_a_socket(boot, rig, body):
+    modifier = boot.modifiers.new("Hook", "HOOK")
+    modifier.object = socket(rig)
+    modifier.matrix_inverse = modifier.object.matrix_world.inverted()
+    modifier.vertex_indices_set(range(len(boot.data.vertices)))
+
+
+def shrinkwrap(boot, rig, body):
+    modifier = boot.modifiers.new("Wrap", "SHRINKWRAP")
+    modifier.target, modifier.wrap_mode = body, "OUTSIDE_SURFACE"
+
+
+def warp(boot, rig, body):
+    modifier = boot.modifiers.new("Warp", "WARP")
+    modifier.object_from, modifier.object_to = socket(rig), socket(rig)
+
+
+def nodes(boot, rig, body):
+    tree = bpy.data.node_groups.new("Look", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    tree.nodes.new("GeometryNodeObjectInfo").inputs["Object"].default_value = body
+    boot.modifiers.new("Nodes", "NODES").node_group = tree
+
+
+def driven_place(boot, rig, body):
+    driver = boot.driver_add("location", 2).driver
+    target = driver.variables.new().targets[0]
+    driver.variables[0].type = "TRANSFORMS"
+    target.id, target.bone_target, target.transform_type = rig, "Shin.L", "ROT_X"
+    target.transform_space, driver.expression = "LOCAL_SPACE", "var"
+
+
+def twice_by_modifiers(boot, rig, body):
+    figure.bind(boot, rig)
+    figure.bind(boot, rig)
+
+
+def twice_as_a_child(boot, rig, body):
+    figure.bind(boot, rig)
+    boot.parent, boot.parent_type = rig, "ARMATURE"
+
+
+def switched_off(boot, rig, body):
+    modifier = figure.bind(boot, rig)
+    modifier.show_viewport = modifier.show_render = False
+
+
 def other_rig(boot, rig, body):
     figure.bind(boot, figure.rig(name="Boot Rig"))
 
@@ -128,6 +186,14 @@ KINDS = [
     (armature_constraint, "constraint Armature"),
     (surface_deform, "modifier Surface, which follows Body"),
     (hook, "modifier Hook, which follows Rig"),
+    (hook_on_a_socket, "modifier Hook, which follows Socket"),
+    (shrinkwrap, "modifier Wrap, which follows Body"),
+    (warp, "modifier Warp, which follows Socket"),
+    (nodes, "modifier Nodes, which follows Body"),
+    (driven_place, "driver on location, which follows Rig"),
+    (twice_by_modifiers, "deformed by Rig twice, the second time by the modifier Armature.001"),
+    (twice_as_a_child, "deformed by Rig twice, by a modifier and as its child"),
+    (switched_off, "modifier Armature, which is off in the viewport"),
     (other_rig, "deformed by Boot Rig and not by Rig"),
     (envelopes, "binds by bone envelopes"),
     (limited, "acts in the group part only"),
@@ -172,6 +238,8 @@ def test_harmless_company_is_not_named(plain, body, rig, boot):
     builders.paint(boot, pin=1.0)
     modifier = boot.modifiers.new("Edit", "VERTEX_WEIGHT_EDIT")
     modifier.vertex_group = "pin"
+    boot.modifiers.new("Mirror", "MIRROR").mirror_object = rig
+    boot.modifiers["Mirror"].use_mirror_merge = False
     boot.modifiers.new("Bevel", "BEVEL")
     assert said(plain(body, boot)) == ""
 

@@ -69,6 +69,35 @@ def body(n: int = 12, armature: bpy.types.Object | None = None) -> bpy.types.Obj
     return obj
 
 
+def limb(name, *, around=6, along=6, length=2.0, bones=("Upper", "Lower"), bound=True):
+    """A capped tube along x on a chain of bones; with `bound`, weighted to them. Returns (mesh, armature)."""
+    rig = bpy.data.objects.new(f"{name} Rig", bpy.data.armatures.new(f"{name} Rig"))
+    bpy.context.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    ends = np.linspace(0, length, len(bones) + 1)
+    for index, bone in enumerate(bones):
+        made = rig.data.edit_bones.new(bone)
+        made.head, made.tail = (ends[index], 0, 0), (ends[index + 1], 0, 0)
+        made.parent = rig.data.edit_bones.get(bones[index - 1]) if index else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    x, angle = np.linspace(0, length, along + 1), np.arange(around) * 2 * np.pi / around
+    positions = [(u, 0.25 * np.cos(a), 0.25 * np.sin(a)) for u in x for a in angle] + [(0, 0, 0), (length, 0, 0)]
+    faces, tips = [], (len(positions) - 2, len(positions) - 1)
+    for j in range(around):
+        k = (j + 1) % around
+        faces += [(i * around + k, (i + 1) * around + k, (i + 1) * around + j, i * around + j) for i in range(along)]
+        faces += [(tips[0], k, j), (tips[1], along * around + j, along * around + k)]
+    obj = mesh(name, positions, faces)
+    if bound:
+        middle = (ends[:-1] + ends[1:]) / 2
+        share = np.exp(-8 * (np.array(positions)[:, :1] - middle) ** 2)
+        share /= share.sum(axis=1, keepdims=True)
+        paint(obj, **{bone.replace(".", "__"): share[:, j] for j, bone in enumerate(bones)})
+        obj.modifiers.new("Armature", "ARMATURE").object = rig
+    return obj, rig
+
+
 def select(*objects: bpy.types.Object) -> None:
     """Select these alone; the last becomes active."""
     bpy.context.view_layer.update()  # else its list may be that of some time ago

@@ -76,5 +76,6 @@ def literals() -> set[str]:
                 texts = [keyword.value for keyword in node.keywords if keyword.arg == "text"]
                 found |= {text.value for text in texts if isinstance(text, ast.Constant)}
             elif isinstance(node, ast.Tuple | ast.Dict):
-                found |= {text.value for text in getattr(node, "elts", None) or node.values if of_a_table(text)}
+                entries = node.elts if isinstance(node, ast.Tuple) else node.values
+                found |= {text.value for text in entries if of_a_table(text)}
     return found

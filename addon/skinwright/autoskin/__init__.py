@@ -8,6 +8,7 @@ import numpy as np
 from .. import csr, jobs
 from ..reporting import AutoskinReport, SkinnedMesh
 from ..scene import armature, object_state, vertex_groups
+from ..scene.watched import Watched
 from .compute import Answer, compute
 from .inputs import Target, read
 from .params import AutoskinParams
@@ -34,7 +35,8 @@ def steps(
 ) -> jobs.Jobs[AutoskinReport]:
     """The same in steps: all are computed before the first is written, and all are written or none."""
     targets = read(objects, rig, params)
-    answers = yield from compute(targets, params)
+    seen = Watched([*objects, *(target.rig for target in targets)])
+    answers = yield from seen.during(compute(targets, params))
     if before_write:
         before_write(objects)
     with object_state.all_or_nothing(objects):

@@ -62,6 +62,7 @@ def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Ob
         )
     if not armature.deform_bones(rig):
         raise SceneError(f"{rig.name} has no bone that deforms {obj.name}: turn Deform on for some")
+    mesh.check_world(obj, rig)
     return rig
 
 

@@ -96,6 +96,7 @@ def steps(target: bpy.types.Object, source: bpy.types.Object | None, params: Che
     result = WeightCheck(target.name, len(garment.rest), faulty, bones=bones.names)
     used = np.unique(garment.rows.bones[garment.rows.values > 0]).tolist()
     result.tested, tests = _tests(rigs, bones, used, params)
+    result.tested += _left_out(target, rigs, [bones.names[bone] for bone in used])
     yield from _check_poses(result, garment, tests)
     return result
 
@@ -128,6 +129,17 @@ def _tests(
         )
     words = [word for word, tests in (("range of motion", bends), ("whole body", body)) if tests]
     return f"{' and '.join(words) or 'no bone has weight'}; deform bones alone, blended linearly", bends + body
+
+
+def _left_out(target: bpy.types.Object, rigs: list[bpy.types.Object], used: list[str]) -> str:
+    """What the target's own deformation does beyond linear blending, in words."""
+    bendy = any(rig.data.bones[n].bbone_segments > 1 for rig in rigs for n in used if n in rig.data.bones)
+    models = [model for model in armature.modifiers(target) if model.show_viewport]
+    words = [
+        *(["bendy bones as straight ones"] if bendy else []),
+        *(["without Preserve Volume"] if any(model.use_deform_preserve_volume for model in models) else []),
+    ]
+    return "".join(f", {word}" for word in words)
 
 
 class _Posable:

@@ -17,6 +17,7 @@ from ..retarget.inputs import joined, joined_rows
 from ..scene import armature, embedded, mesh, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
+from ..scene.watched import Watched
 from .params import EmbedParams
 
 __all__ = ["EmbedParams", "EmbedReport", "embed_armature", "steps"]
@@ -77,7 +78,9 @@ def steps(
         donor = _donor(context, source, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
+    seen = Watched([source, *targets])
     embedding = yield native.start_embedding(targets[0].name, (positions, triangles), arrays, donor, **options)
+    seen.check()
     return _write(context, source, list(targets), bones, embedding, params)
 
 
@@ -124,6 +127,9 @@ def _write(
     name = f"{targets[0].name} Rig"
     confidence = dict(zip(bones.names, embedding.confidence.tolist(), strict=True))
     places = {b: (h, t) for b, h, t in zip(bones.names, embedding.heads, embedding.tails, strict=True)}
+    outside = [bones.names[j] for j in embedding.report["outside"]]
+    warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
+    meshes = [obj.name for obj in targets]
     rig = embedded.create(context, name, source, bones, places)
     try:
         with object_state.all_or_nothing(targets):
@@ -131,11 +137,7 @@ def _write(
             for obj in targets if params.bind else ():
                 if armature.find(obj) is None:
                     armature.bind(obj, rig)
+            return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
     except BaseException:
         embedded.remove(rig)
         raise
-    outside = [bones.names[j] for j in embedding.report["outside"]]
-    warnings = [f"Bones that could not be moved inside of the mesh: {', '.join(outside[:8])}"] if outside else []
-    return EmbedReport(
-        rig.name, [obj.name for obj in targets], confidence, outside, embedding.report["seconds"], warnings
-    )

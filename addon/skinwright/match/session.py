@@ -14,7 +14,7 @@ from .. import csr
 from ..jobs import Jobs
 from ..scene import identity, mask, vertex_groups
 from ..transfer.checks import check_objects
-from ..transfer.compute import Result, bone_rows, bone_source, prepare, to_result
+from ..transfer.compute import Result, bone_rows, prepare, to_result
 from ..transfer.inputs import read_body, read_garment, read_mask
 from ..transfer.params import TransferParams
 
@@ -64,7 +64,7 @@ class MatchSession:
         self.object = identity.of(target)
         self.body = read_body(source, params)
         self.garment = read_garment(target, self.body, params)
-        self.inpainting = prepare(bone_source(self.body), self.garment, params)
+        self.inpainting = prepare(self.body, self.garment, params)
         self.n_vertices = self.garment.completion.n_own
         self.mask = np.full(self.n_vertices, mask.AUTOMATIC, np.uint8)
         self.mask_version = 0
@@ -113,9 +113,7 @@ class MatchSession:
         category[matched & (self.mask == mask.FORCE_MATCH)] = Category.FORCED_MATCH
         category[self.mask == mask.INPAINT] = Category.FORCED_INPAINT
         category[~matched & ~has_any(self.inpainting.islands, confidence > 0)] = Category.UNMATCHED_ISLAND
-        size = float(np.linalg.norm(self.garment.geometry.size))
-        absolute = params.max_distance
-        max_distance = params.relative_max_distance * size if absolute is None else absolute
+        max_distance = self.inpainting.max_distance(params)
         graded = confidence if params.method == "confidence" else None
         return Match(category, graded, max_distance, params.max_normal_angle)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from bpy.types import Context, Object, Operator
 
 from .. import native, reporting
-from ..errors import Refused, internal
+from ..errors import sentence
 from ..stored import keeping
 from .modal import brush_session
 
@@ -40,24 +40,22 @@ class SkinwrightOperator(Operator):
         """What `work` returns; an exception becomes a sentence."""
         try:
             return work()
-        except Refused as refused:
-            self._fail(str(refused))
         except Exception as error:
-            self._fail(f"{self.bl_label}: {internal(error)}")
+            self._fail(sentence(self.bl_label, error))
         return {"CANCELLED"}
 
-    def _fail(self, sentence: str) -> None:
-        reporting.remember(self.bl_label, sentence, failed=True)
-        self.report({"ERROR"}, sentence)
+    def _fail(self, text: str) -> None:
+        reporting.remember(self.bl_label, text, failed=True)
+        self.report({"ERROR"}, text)
 
     def keep_before(self, objects: Sequence[Object]) -> None:
         """Keep the weights of `objects` in the file, as they are before this operator writes."""
         keeping.keep_before(objects, self.bl_label)
 
-    def tell(self, sentence: str, warnings: list[str]) -> set[str]:
+    def tell(self, text: str, warnings: list[str]) -> set[str]:
         """The result, and then what is worth a look, as the status bar shows the last report."""
-        reporting.remember(self.bl_label, sentence, warnings)
-        self.report({"INFO"}, sentence)
+        reporting.remember(self.bl_label, text, warnings)
+        self.report({"INFO"}, text)
         for warning in warnings:
             self.report({"WARNING"}, warning)
         return {"FINISHED"}

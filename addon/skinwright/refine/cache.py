@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .. import files, jobs, memory
 from ..scene import mesh_cache, object_state, poses
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from . import character as characters
 from .params import CacheFormat, RefineParams
 from .solving import Solving
@@ -57,11 +58,13 @@ def steps(
     mesh_cache.check(obj)
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)
+    seen = Watched([obj, bpy.data.objects[character.rig]])
     memory.expect(f"Refining {last - first + 1} frames of {obj.name}", _bytes(character, last - first + 1))
     matrices = list(_poses(obj, character, range(first, last + 1)))
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
     tasks = [lambda pose=pose: refiner.solve(pose, quality="bake") for pose in matrices]
     solved = yield Solving(tasks)
+    seen.check()
     positions = np.stack(solved)
     if not np.isfinite(positions).all():
         raise SceneError(f"{obj.name}: a refined frame is not finite; nothing was written")

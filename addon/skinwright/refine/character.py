@@ -66,6 +66,7 @@ def read(obj: bpy.types.Object) -> Character:
     bones = [bone.name for bone in rig.data.bones if bone.name in deforming and bone.name in members]
     if not bones:
         raise SceneError(f"{obj.name} has no vertex group of a deform bone of {rig.name}: give it weights first")
+    mesh.check_world(obj, rig)
     positions = mesh.rest_positions(obj.data)
     if not np.isfinite(positions).all():
         raise SceneError(f"{obj.name} has a coordinate that is not a number: move or delete that vertex")

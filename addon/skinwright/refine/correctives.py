@@ -1,9 +1,10 @@
 """Corrective shape keys: joints sampled, solved, pulled back to rest, written sparsely and driven by the joints."""
 
+import itertools
 import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -11,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import jobs, native
-from ..scene import driven_keys
+from ..scene import armature, driven_keys
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from . import character as characters
 from .character import Character
 from .drivers import CHANNELS, expression
 from .params import CorrectiveParams
 from .pull_back import rest_offsets
 from .sampling import Sample, joints, samples
+from .selection import needed
 from .solving import Solving
 
 PREFIX = "Refine"
@@ -48,6 +51,7 @@ class CorrectiveReport:
 
     target: str
     rig: str
+    sampled: int = 0
     keys: list[str] = field(default_factory=list)
     made_basis: bool = False
     certificates: list[Certificate] = field(default_factory=list)
@@ -57,7 +61,7 @@ class CorrectiveReport:
         before, after = (sum(getattr(c, name) for c in self.certificates) for name in ("pairs_before", "pairs_after"))
         joints = len({c.joint for c in self.certificates})
         return (
-            f"{self.target}: {len(self.keys)} corrective keys for {joints} joints; "
+            f"{self.target}: {len(self.keys)} corrective keys for {joints} joints, from {self.sampled} poses; "
             f"intersecting pairs in the sampled poses {before} before, {after} after"
         )
 
@@ -72,7 +76,9 @@ class CorrectiveReport:
 
 
 @dataclass(frozen=True)
-class _Key:
+class _Solved:
+    """A sample's offsets at rest (n, 3) of the vertices (n,) that move."""
+
     sample: Sample
     vertices: NDArray[np.int64]
     offsets: NDArray[np.float64]
@@ -90,52 +96,65 @@ def steps(
     """
     driven_keys.check(obj)
     character = characters.read(obj)
+    seen = Watched([obj, bpy.data.objects[character.rig]])
     bones = joints(character, chosen or set())
     if not bones:
         raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
+    rig = bpy.data.objects[character.rig]
+    poses = samples(bones, params, [armature.rotation_limits(rig, character.bones[bone]) for bone in bones])
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
-    poses = samples(bones, params)
-    tasks = [lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses]
-    solved = yield Solving(tasks)
-    report = CorrectiveReport(obj.name, character.rig)
-    kept = [(key, certificate) for key, certificate in solved if key is not None]
-    for key, _ in kept:
-        if not np.isfinite(key.offsets).all():
+    solved = yield Solving([lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses])
+    for one in solved:
+        if not np.isfinite(one.offsets).all():
             raise SceneError(
-                f"{obj.name}: no finite offsets at {character.bones[key.sample.bone]}; nothing was written"
+                f"{obj.name}: no finite offsets at {character.bones[one.sample.bone]}; nothing was written"
             )
-    report.certificates = [certificate for _, certificate in kept]
+    keys = _chosen(character, solved, params)
+    report = CorrectiveReport(obj.name, character.rig, sampled=len(poses))
+    report.certificates = yield Solving([lambda key=key: _certify(character, refiner, key) for key in keys])
+    seen.check()
     with driven_keys.all_or_nothing(obj, RECORD):
-        _write(obj, character, [key for key, _ in kept], report)
+        _write(obj, character, keys, report)
         if certify:
             certify(report)
     return report
 
 
-def _solve(
-    character: Character, refiner: native.Refiner, sample: Sample, params: CorrectiveParams
-) -> tuple[_Key | None, Certificate | None]:
+def _solve(character: Character, refiner: native.Refiner, sample: Sample, params: CorrectiveParams) -> _Solved:
     pose = sample.pose(character)
     target, before = refiner.solve(pose, quality="bake"), character.skinned(pose)
     offsets = rest_offsets(character, sample, target - before)
-    length = float(character.lengths()[sample.bone])
-    moved = np.flatnonzero(np.linalg.norm(offsets, axis=1) > params.tolerance * length)
-    if not moved.size:
-        return None, None
-    key = _Key(sample, moved, offsets[moved])
-    return key, _certify(character, refiner, key, pose, target, before)
+    smallest = params.tolerance * float(character.lengths()[sample.bone])
+    moved = np.flatnonzero(~(np.linalg.norm(offsets, axis=1) <= smallest))
+    return _Solved(sample, moved, offsets[moved])
+
+
+def _chosen(character: Character, solved: list[_Solved], params: CorrectiveParams) -> list[_Solved]:
+    """The samples that get a key, which then know their neighbours among the keys."""
+    keys = []
+    for _, group in itertools.groupby(solved, lambda one: (one.sample.bone, one.sample.axis, one.sample.sign)):
+        ones = list(group)
+        vertices = np.unique(np.concatenate([one.vertices for one in ones]))
+        fields = [np.zeros((len(vertices), 3)) for _ in ones]
+        for field_, one in zip(fields, ones, strict=True):
+            field_[np.searchsorted(vertices, one.vertices)] = one.offsets
+        sample = ones[0].sample
+        most = params.accuracy * float(character.lengths()[sample.bone])
+        kept = needed(sample.angles, fields, most)
+        angles = tuple(sample.angles[k] for k in kept)
+        keys += [replace(ones[k], sample=replace(sample, angles=angles, k=n)) for n, k in enumerate(kept)]
+    return keys
 
 
 def _certify(
     character: Character,
     refiner: native.Refiner,
-    key: _Key,
-    pose: NDArray[np.float64],
-    target: NDArray[np.float32],
-    before: NDArray[np.float32],
+    key: _Solved,
 ) -> Certificate:
     """Figures of the pose as the key will show it, the left-out offsets and the damped inverse included."""
     sample, shown = key.sample, character.positions.copy()
+    pose = sample.pose(character)
+    target, before = refiner.solve(pose, quality="bake"), character.skinned(pose)
     shown[key.vertices] += key.offsets.astype(np.float32)
     after = character.posed(shown, pose)
     first, second = refiner.measure(pose, before), refiner.measure(pose, after)
@@ -158,7 +177,7 @@ def _of_joint(figures: dict[str, Any], bone: int) -> dict[str, float]:
     return next((j for j in figures["joints"] if j["bone"] == bone), {"volume": 0.0, "bulge": 1.0})
 
 
-def _write(obj: bpy.types.Object, character: Character, keys: list[_Key], report: CorrectiveReport) -> None:
+def _write(obj: bpy.types.Object, character: Character, keys: list[_Solved], report: CorrectiveReport) -> None:
     remove(obj)
     report.made_basis = obj.data.shape_keys is None
     rig = bpy.data.objects[character.rig]

@@ -64,7 +64,14 @@ class CorrectiveParams(RefineParams):
         most=math.radians(170),
         unit="ANGLE",
     )
-    samples: int = setting(4, "Samples", "Keys along each direction of a joint", least=1, most=12, soft_most=6)
+    samples: int = setting(4, "Samples", "Poses along each direction of a joint", least=1, most=12, soft_most=6)
+    accuracy: float = setting(
+        0.005,
+        "Accuracy",
+        "Poses get no key where the other keys come this near, as a share of the bone's length; 0 keeps all",
+        most=0.1,
+        precision=4,
+    )
     tolerance: float = setting(
         0.002, "Smallest Offset", "Offsets below this share of the bone's length are left out", most=0.1, precision=4
     )

@@ -43,14 +43,23 @@ class Sample:
         return np.where(below(character, self.bone)[:, None, None], turned, np.eye(4))
 
 
-def samples(bones: list[int], params: CorrectiveParams) -> list[Sample]:
-    """Every pose that is solved, direction by direction."""
+Limits = dict[str, tuple[float, float]]
+# Joints that can turn by less than this (radians) in a direction are not sampled in it.
+_LEAST = np.radians(10)
+
+
+def samples(bones: list[int], params: CorrectiveParams, limits: list[Limits]) -> list[Sample]:
+    """Every pose that is solved, direction by direction, as far as each bone's limits go."""
     steps = np.arange(1, params.samples + 1, dtype=np.int64) / params.samples
-    bends, twists = (tuple(float(x) for x in steps * angle) for angle in (params.angle, params.twist))
-    directions = [(axis, sign, bends) for axis, sign in BENDS]
-    if params.twist > 0:
-        directions += [(axis, sign, twists) for axis, sign in TWISTS]
-    return [Sample(bone, *direction, k) for bone in bones for direction in directions for k in range(params.samples)]
+    found = []
+    for bone, limit in zip(bones, limits, strict=True):
+        for axis, sign in (*BENDS, *TWISTS):
+            low, high = limit[axis]
+            most = min(params.twist if axis == "Y" else params.angle, high if sign > 0 else -low)
+            if most >= _LEAST:
+                angles = tuple(float(x) for x in steps * most)
+                found += [Sample(bone, axis, sign, angles, k) for k in range(params.samples)]
+    return found
 
 
 def below(character: Character, bone: int) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ import bpy
 
 from .. import jobs
 from ..jobs import Jobs
+from ..scene.watched import Watched
 from .compute import compute
 from .inputs import match_bones, read_pair, rest_bones_of
 from .params import RetargetParams, from_json, to_json
@@ -43,5 +44,6 @@ def steps(
 ) -> Jobs[RetargetReport]:
     """The same, job by job. Nothing is written before all is computed; `before_write` is told when writing begins."""
     pair = read_pair(context, source, targets, params)
-    result = yield from compute(pair, params)
+    seen = Watched([*pair.source.meshes, *pair.target.meshes, pair.source.armature, pair.target.armature])
+    result = yield from seen.during(compute(pair, params))
     return write(pair, result, params, before_write)

@@ -34,7 +34,7 @@ def write(
             warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
         if params.show_correspondence:
             _show(pair, result)
-    return _report(pair, result, warnings)
+        return _report(pair, result, warnings)
 
 
 def _parts(character: Character) -> list[tuple[bpy.types.Object, int, int]]:

@@ -1,5 +1,6 @@
 """Armatures: which one deforms a mesh, its bones, and attaching one."""
 
+import math
 from collections.abc import Sequence
 
 import bpy
@@ -108,7 +109,7 @@ def is_posed(armature: bpy.types.Object) -> bool:
 
 
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
-    """Let the armatures that deform `source` deform `obj` in the same way: by modifiers of the same settings.
+    """Let the armatures that deform `source` deform `obj`: by modifiers of the same settings.
 
     They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
     """
@@ -198,3 +199,25 @@ def local_rotations(armature: bpy.types.Object) -> dict[str, Quaternion]:
         bone.name: convert(pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL").to_quaternion()
         for bone in armature.pose.bones
     }
+
+
+def rotation_limits(armature: bpy.types.Object, bone: str) -> dict[str, tuple[float, float]]:
+    """Least and greatest angle (radians) about each of the bone's axes "X", "Y" and "Z" that its limits allow.
+
+    Locks count unless other constraints move the bone: then they keep hands off it, and do not say how it turns.
+    """
+    pose = armature.pose.bones[bone]
+    active = [constraint for constraint in pose.constraints if not constraint.mute]
+    limiting = [c for c in active if c.type == "LIMIT_ROTATION" and c.owner_space == "LOCAL"]
+    limits = {}
+    for k, axis in enumerate("XYZ"):
+        letter = axis.lower()
+        ranges = [(-math.pi, math.pi)]
+        if len(active) == len(limiting) and (pose.lock_rotation[k] or getattr(pose, f"lock_ik_{letter}")):
+            ranges.append((0.0, 0.0))
+        if getattr(pose, f"use_ik_limit_{letter}"):
+            ranges.append((getattr(pose, f"ik_min_{letter}"), getattr(pose, f"ik_max_{letter}")))
+        limited = [c for c in limiting if getattr(c, f"use_limit_{letter}")]
+        ranges += [(getattr(c, f"min_{letter}"), getattr(c, f"max_{letter}")) for c in limited]
+        limits[axis] = max(low for low, _ in ranges), min(high for _, high in ranges)
+    return limits

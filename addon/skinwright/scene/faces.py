@@ -13,7 +13,7 @@ _TIE = 1e-6
 
 @dataclass(frozen=True)
 class Quads:
-    """Convex quads: `corners` (Q, 4) around each, and `first` (Q,) of the two triangles in a row that it is cut into."""
+    """Convex quads: `corners` (Q, 4) around each, and the `first` (Q,) of the two triangles that it is cut into."""
 
     corners: NDArray[np.uint32]
     first: NDArray[np.int64]

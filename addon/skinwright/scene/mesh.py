@@ -172,6 +172,12 @@ def _only_selected(context: bpy.types.Context, objects: list[bpy.types.Object]) 
             obj.select_set(obj in before)
 
 
+def check_world(*objects: bpy.types.Object) -> None:
+    """Raise SceneError for an object, or an armature, whose world matrix flattens everything in it."""
+    for obj in objects:
+        _checked_determinant(obj, np.array(obj.matrix_world, dtype=np.float64))
+
+
 def _checked_determinant(obj: bpy.types.Object, matrix: NDArray[np.float64]) -> float:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     determinant = float(np.linalg.det(matrix[:3, :3]))

@@ -11,10 +11,15 @@ from . import modifiers
 
 @dataclass(frozen=True)
 class Reflection:
-    """A mirrored copy is `world` (4, 4) times the world positions; vertices that move less than `merged` are one."""
+    """A mirrored copy is `world` (4, 4) times the world positions; vertices that move less than `merged` are one.
+
+    `flips` if the copy's groups are those of the other side; `name` is the modifier's.
+    """
 
     world: NDArray[np.float64]
     merged: float
+    flips: bool
+    name: str
 
 
 def before_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
@@ -28,21 +33,39 @@ def before_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
     return found
 
 
-def reflections(obj: bpy.types.Object, matrix: NDArray[np.float64]) -> list[Reflection]:
-    """What completes the mesh, whose place in the world is `matrix` (4, 4), in the order in which it is done.
+def reflections(obj: bpy.types.Object, matrix: NDArray[np.float64], positions: NDArray[np.float32]) -> list[Reflection]:
+    """What completes the mesh, whose place in the world is `matrix` (4, 4) and whose vertices lie at `positions` (V, 3)
+    there, in the order in which it is done.
 
-    A modifier that cuts the mesh at its plane completes nothing: the mesh may be whole. Nor does one that leaves the
-    groups as they are: its halves are to follow the same bones.
+    A modifier that cuts the mesh at its plane completes nothing if there is something to be cut off.
     """
     found = []
     scale = float(np.abs(np.linalg.det(matrix[:3, :3]))) ** (1 / 3)
     for modifier in before_the_pose(obj):
-        if any(modifier.use_bisect_axis) or not modifier.use_mirror_vertex_groups:
-            continue
         plane = np.array(modifier.mirror_object.matrix_world) if modifier.mirror_object else matrix
         merged = modifier.merge_threshold * scale if modifier.use_mirror_merge else 0.0
-        for axis in np.flatnonzero(list(modifier.use_axis)):
+        for axis in np.flatnonzero(list(modifier.use_axis)).tolist():
+            if _cuts_off(modifier, axis, plane, positions, merged):
+                continue
             flip = np.eye(4)
             flip[axis, axis] = -1
-            found.append(Reflection(plane @ flip @ np.linalg.inv(plane), merged))
+            world = plane @ flip @ np.linalg.inv(plane)
+            found.append(Reflection(world, merged, modifier.use_mirror_vertex_groups, modifier.name))
     return found
+
+
+def _cuts_off(
+    modifier: bpy.types.MirrorModifier,
+    axis: int,
+    plane: NDArray[np.float64],
+    positions: NDArray[np.float32],
+    merged: float,
+) -> bool:
+    """Whether the modifier throws away what lies on the other side of the plane, and there is something."""
+    if not modifier.use_bisect_axis[axis]:
+        return False
+    inverse = np.linalg.inv(plane)
+    side = positions @ inverse[axis, :3] + inverse[axis, 3]
+    side = -side if modifier.use_bisect_flip_axis[axis] else side
+    scale = float(np.abs(np.linalg.det(plane[:3, :3]))) ** (1 / 3)
+    return bool(side.min(initial=0) < -(modifier.bisect_threshold + merged / scale + 1e-6))

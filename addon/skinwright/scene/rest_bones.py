@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import armature
+from . import armature, mesh
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class RestBones:
 
 
 def read(rig: bpy.types.Object, names: Sequence[str]) -> RestBones:
-    """The bones of these names as the armature rests now, where its object stands."""
+    """The bones of these names as the armature rests now, where its object stands. Raises SceneError if it is flat."""
+    mesh.check_world(rig)
     world = np.array(rig.matrix_world, np.float64)
     local = np.array([rig.data.bones[name].matrix_local for name in names], np.float64).reshape(-1, 4, 4)
     frames = world @ local

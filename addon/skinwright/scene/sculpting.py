@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import armature as scene_armature
-from . import vertex_groups
+from . import mesh, vertex_groups
 from .error import SceneError
 
 # These leave every vertex where it is.
@@ -21,6 +21,7 @@ def check(obj: bpy.types.Object) -> bpy.types.Object:
     check_editable(obj)
     _check_sculpt_mode(obj)
     rig = _armature(obj)
+    mesh.check_world(obj, rig)
     for modifier in _acting(obj):
         _check_modifier(obj, modifier)
     _check_before(obj)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 _OPPOSITE = {"l": "r", "L": "R", "left": "right", "Left": "Right", "LEFT": "RIGHT", "左": "右"}
 _OPPOSITE |= {right: left for left, right in _OPPOSITE.items()}
@@ -61,6 +62,19 @@ def _by_position(armature: bpy.types.Object, names: list[str]) -> dict[str, str]
         if len(near) == 1:
             found[name] = bones[int(near[0])].name
     return found
+
+
+def exchanged(armature: bpy.types.Object | None, opposite: dict[str, str], world: NDArray[np.float64]) -> bool | None:
+    """Whether the reflection `world` (4, 4) exchanges left and right; None where no bone has another side."""
+    bones = armature.data.bones if armature else {}
+    pairs = [(bones[n], bones[o]) for n, o in opposite.items() if o != n and n in bones and o in bones]
+    if armature is None or not pairs:
+        return None
+    place = np.array(armature.matrix_world)
+    here, there = (np.array([(*b[k].head_local, 1, *b[k].tail_local, 1) for b in pairs]) for k in (0, 1))
+    here, there = (ends.reshape(-1, 4) @ place.T for ends in (here, there))
+    reflected = here @ world.T
+    return bool(np.linalg.norm(reflected - there, axis=1).sum() < np.linalg.norm(reflected - here, axis=1).sum())
 
 
 def unflippable(opposite: dict[str, str]) -> str:

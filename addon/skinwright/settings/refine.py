@@ -8,7 +8,7 @@ from ..refine.params import CorrectiveParams, RefineParams
 from .properties import properties, values
 
 _SOLVER = ["stretch", "volume", "bind", "energy", "self_collision", "cell"]
-_SAMPLING = ["angle", "twist", "samples", "tolerance"]
+_SAMPLING = ["angle", "twist", "samples", "accuracy", "tolerance"]
 
 
 class RefineSettings:

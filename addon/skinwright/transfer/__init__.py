@@ -9,6 +9,7 @@ from .. import csr, jobs, soundness
 from ..reporting import Report
 from ..scene import mesh, object_state
 from ..scene.error import SceneError
+from ..scene.watched import Watched
 from .checks import check_source, source_warnings, target_problem
 from .compute import Failure, compute
 from .inputs import Body, Garment, read_body, read_garment
@@ -46,8 +47,9 @@ def steps(
     check_source(source, targets)
     with mesh.object_mode(context):
         body = read_body(source, params, targets)
+        seen = Watched([*targets, *body.objects, *body.rigs])
         garments, failures = _read(source, targets, body, params)
-        results, unsolved = yield from compute(body, garments, params)
+        results, unsolved = yield from seen.during(compute(body, garments, params))
         plans, unbindable = _plan(body, [garment for garment in garments if garment.object.name in results], results)
         failures += unsolved + unbindable
         if failures and not (params.skip_failing and plans):

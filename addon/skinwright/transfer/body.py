@@ -5,6 +5,7 @@ from functools import cached_property
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
@@ -43,6 +44,17 @@ class Body:
     def is_partial(self) -> bool:
         """Whether only some of its bones are written."""
         return not set(self.bones) <= self.chosen
+
+    @cached_property
+    def unturned(self) -> NDArray[np.float64]:
+        """(4, 4) the world without the source's own rotation: the size of a box along the axes depends on no rotation
+        there."""
+        axes = np.array(self.object.matrix_world.to_3x3(), dtype=np.float64)
+        left, _, right = np.linalg.svd(axes)
+        turn = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+        matrix = np.eye(4)
+        matrix[:3, :3] = turn.T
+        return matrix
 
     @cached_property
     def flaws(self) -> dict[str, int]:

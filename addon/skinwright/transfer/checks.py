@@ -7,7 +7,7 @@ import numpy as np
 
 from ..scene import armature, mesh, mirror, sides, vertex_groups
 from ..scene.error import SceneError
-from .inputs import Body, Garment
+from .inputs import Body, Garment, mirrors_rightly
 from .params import TransferParams
 
 
@@ -92,18 +92,23 @@ def _shear(body: Body, garment: Garment) -> str:
 
 def _mirror(body: Body, garment: Garment) -> str:
     """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
-    found = mirror.before_the_pose(garment.object)
-    half = [m for m in found if not m.use_mirror_vertex_groups]
-    if half:
+    obj, shape = garment.object, garment.shape
+    found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
+    wrong = [reflection for reflection in found if not mirrors_rightly(body, reflection)]
+    if not wrong:
+        return ""
+    named = wrong[0].name
+    exchanged = sides.exchanged(body.armature, body.opposite, wrong[0].world)
+    if not wrong[0].flips:
+        return f"Vertex Groups is off in the modifier {named} of {obj.name}: both sides will follow the bones of one"
+    if exchanged is False:
         return (
-            f"Vertex Groups is off in the modifier {half[0].name} of {garment.object.name}: "
-            "both sides will follow the bones of one"
+            f"The modifier {named} of {obj.name} exchanges left and right in a copy that lies on the same side: "
+            "apply it and transfer again"
         )
     name = sides.unflippable(body.opposite)
-    if not found or not name:
-        return ""
     return (
-        f"The modifier {found[0].name} of {garment.object.name} cannot tell that {body.opposite[name]} mirrors {name}, "
+        f"The modifier {named} of {obj.name} cannot tell that {body.opposite[name]} mirrors {name}, "
         "so both sides will follow the bones of one: apply it and transfer again, or rename the bones"
     )
 

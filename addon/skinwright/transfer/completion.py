@@ -85,7 +85,7 @@ def _reflect(done: Completion, reflection: Reflection) -> Completion:
         done.n_own,
         np.concatenate([done.image, number[done.image]]),
         np.concatenate([done.origin, done.origin]),
-        np.concatenate([done.flipped, ~done.flipped]),
+        np.concatenate([done.flipped, done.flipped ^ reflection.flips]),
     )
 
 

@@ -17,7 +17,7 @@ from ..jobs import Jobs
 from . import completion, fans, merging, parts, scalar_fields
 from .inputs import Body, Garment
 from .params import TransferParams
-from .prepared import Prepared
+from .prepared import Prepared, in_frame
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,15 @@ def bone_source(body: Body) -> native.Source:
     return _source(body, body.bone_weights, len(body.bones))
 
 
-def prepare(source: native.Source, garment: Garment, params: TransferParams) -> Prepared:
-    """One target laid over the body."""
-    return Prepared(source, [garment], params)
+def prepare(body: Body, garment: Garment, params: TransferParams) -> Prepared:
+    """One target laid over the body and its bones."""
+    return Prepared(body, bone_source(body), [garment], params)
 
 
 def _source(body: Body, rows: Rows, n_columns: int) -> native.Source:
-    return native.Source(body.name, *fans.surface(body.geometry), fans.rows(rows, body.geometry.quads), n_columns)
+    positions, triangles = fans.surface(body.geometry)
+    positions = in_frame(positions, body.unturned)
+    return native.Source(body.name, positions, triangles, fans.rows(rows, body.geometry.quads), n_columns)
 
 
 def _compute_group(
@@ -102,13 +104,13 @@ def _compute_group(
 ) -> Jobs[list[Result]]:
     """The results of targets that are solved together; `packed` are the weights of the fields."""
     start = time.perf_counter()
-    prepared = Prepared(source, garments, params)
+    prepared = Prepared(body, source, garments, params)
     lost = prepared.lost_halves()
     if any(lost):
         # A mirrored half with nothing to match would be solved from this half's side and then drag it to the middle.
         alone = [replace(g, completion=completion.plain(g.shape.geometry)) for g in garments]
         garments = [other if gone else g for g, other, gone in zip(garments, alone, lost, strict=True)]
-        prepared = Prepared(source, garments, params)
+        prepared = Prepared(body, source, garments, params)
     with_bones = bool(set(body.bones) & body.chosen)
     names = [garment.names if with_bones else [] for garment in garments]
     rows = [csr.empty(len(garment.writable)) for garment in garments]

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
+from ..scene.mesh import Geometry, transformed
 from . import parts
-from .inputs import Garment
+from .inputs import Body, Garment
 from .params import TransferParams
 
 
@@ -20,20 +21,33 @@ class Prepared:
     Arrays are those of the targets' own vertices, one target after the other: no mirrored halves.
     """
 
-    def __init__(self, source: native.Source, garments: Sequence[Garment], params: TransferParams) -> None:
+    def __init__(self, body: Body, source: native.Source, garments: Sequence[Garment], params: TransferParams) -> None:
         self.garments = garments
         self.name = " + ".join(garment.object.name for garment in garments)
         united = parts.united([garment.geometry for garment in garments])
         self._settings = self._keywords(params)
+        self._shapes = (united, body.geometry)
+        self._frame = body.unturned
         self._inpainting = native.Inpainting(
             source,
             self.name,
-            united.positions,
+            in_frame(united.positions, self._frame),
             united.triangles,
             params.threads,
             edges=united.wires,
             **self._settings,
         )
+
+    def max_distance(self, params: TransferParams) -> float:
+        """The distance in force, world units."""
+        absolute = self._keywords(params)["max_distance"]
+        return params.relative_max_distance * self._reference if absolute is None else float(absolute)
+
+    @cached_property
+    def _reference(self) -> float:
+        """What a relative distance refers to, world units."""
+        target, source = (_diagonal(shape, self._frame) for shape in self._shapes)
+        return max(target, 0.3 * source)
 
     def set_source_weights(self, rows: Rows, n_columns: int) -> None:
         """Gives the body other weights; a solve with them factors nothing again."""
@@ -73,7 +87,7 @@ class Prepared:
 
     def _keywords(self, params: TransferParams) -> dict[str, Any]:
         """The settings of a solve."""
-        settings = params.native()
+        settings = params.native() | {"average_ties": True}  # mirrored places are to get mirrored rows
         del settings["threads"]
         distances = [garment.distance for garment in self.garments]
         return settings if None in distances else settings | {"max_distance": max(distances)}  # type: ignore[type-var]
@@ -116,3 +130,15 @@ class Prepared:
             for garment, mask in zip(self.garments, masks, strict=True)
         ]
         return np.concatenate([g.completion.spread(mask) for g, mask in zip(self.garments, full, strict=True)])
+
+
+def in_frame(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Positions (V, 3) moved by a matrix (4, 4), to the bit as they are where that does nothing."""
+    return positions if np.allclose(matrix, np.eye(4), atol=1e-7) else transformed(positions, matrix)
+
+
+def _diagonal(shape: Geometry, frame: NDArray[np.float64]) -> float:
+    """Of the box around all vertices that a triangle uses, or around all if there is none."""
+    positions = in_frame(shape.positions, frame)
+    used = positions[shape.triangles.reshape(-1)] if len(shape.triangles) else positions
+    return float(np.linalg.norm(np.ptp(used, axis=0)))

@@ -2,7 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use skinwright_core::refine::constraint::{Axis, HalfSpace, bind, energy, self_collision, stretch, volume};
-use skinwright_core::refine::projection::{Batch, Colouring, Energy, Kernel, Particle, Stretch, Volume, project};
+use skinwright_core::refine::projection::{
+    Batch, Blocks, Colouring, Flesh, Kernel, Multipliers, Particle, Stretch, project,
+};
 use skinwright_core::refine::{Quality, Refiner, Settings, intersecting_pairs};
 use skinwright_core::skinning::pose_from_matrices;
 use skinwright_core::{Error, Progress, TriMesh, Weights};
@@ -77,36 +79,36 @@ fn noise(seed: u32) -> f32 {
 }
 
 #[test]
-fn lanes_have_the_bits_of_the_scalar_twin_and_batches_share_no_particle() {
+fn lanes_on_any_number_of_threads_have_the_bits_of_the_scalar_twin() {
     let count = 3000u32;
     let particles: Vec<Particle> =
         (0..count).map(|i| [noise(3 * i), noise(3 * i + 1), noise(3 * i + 2), (i % 7 != 0) as u8 as f32]).collect();
     let corner = |k: u32, n: u32| (k * 37 + n * 811 + k * k % 97) % count;
     let fours: Vec<[u32; 4]> = (0..5000).map(|k| [0, 1, 2, 3].map(|n| corner(k, n))).collect();
     let twos: Vec<[u32; 2]> = (0..5000).map(|k| [corner(k, 0), corner(k, 1)]).collect();
-    let (order, pairs) = (Colouring::new(&fours, count as usize), Colouring::new(&twos, count as usize));
-    let mut from = 0;
-    for &end in &order.ends {
-        let mut used: Vec<u32> = order.order[from..end as usize].iter().flat_map(|&k| fours[k as usize]).collect();
-        let all = used.len();
-        used.sort_unstable();
-        used.dedup();
-        assert_eq!(used.len(), all);
-        from = end as usize;
-    }
-    let run = |kernel| {
+    let blocks = Blocks::new(0, count as usize);
+    let (of_fours, of_twos) = (Colouring::new(&fours, count as usize), Colouring::new(&twos, count as usize));
+    let all: Vec<u32> = (0..5000).collect();
+    let run = |kernel, threads: usize| {
         let mut particles = particles.clone();
-        let mut edges = Batch::new(&pairs, |k| twos[k as usize], |_| [0.3]);
-        let mut volumes = Batch::new(&order, |k| fours[k as usize], |_| [0.02, 0.005]);
-        let mut springs = Batch::new(&order, |k| fours[k as usize], |_| [0.3; 4]);
-        for _ in 0..3 {
-            project(kernel, Stretch(1.0), &mut edges, &mut particles);
-            project(kernel, Volume(0.1), &mut volumes, &mut particles);
-            project(kernel, Energy(2.0), &mut springs, &mut particles);
-        }
+        let edges = Batch::new(blocks, &of_twos, &all, |k| twos[k as usize], |_| [0.3]);
+        let tetrahedra = Batch::new(blocks, &of_fours, &all, |k| fours[k as usize], |_| []);
+        let mut multipliers = (Multipliers::new(edges.len()), Multipliers::new(tetrahedra.len()));
+        let flesh = Flesh { volume: 0.02, arm: 0.3, volume_compliance: Some(0.0005), energy_compliance: Some(2.0) };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            for _ in 0..3 {
+                project(kernel, Stretch(1.0), &edges, &mut multipliers.0, &mut particles);
+                project(kernel, flesh, &tetrahedra, &mut multipliers.1, &mut particles);
+            }
+        });
         particles.into_flattened().into_iter().map(f32::to_bits).collect::<Vec<_>>()
     };
-    assert_eq!(run(Kernel::Lanes), run(Kernel::Scalar));
+    let twin = run(Kernel::Scalar, 1);
+    assert_ne!(twin, particles.as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>());
+    for threads in [1, 2, 5] {
+        assert_eq!(run(Kernel::Lanes, threads), twin);
+    }
 }
 
 struct Limb {

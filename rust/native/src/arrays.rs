@@ -8,6 +8,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::error::InvalidParameter;
+use crate::memory;
 
 /// A 1-D argument of any number type.
 pub type Vector<'py, T> = Array<'py, T, Ix1>;
@@ -59,7 +60,9 @@ where
         if let Some((least, most)) = T::WHOLE {
             check_whole(&object, least, most)?;
         }
-        object.extract().map(Self)
+        let array: PyArrayLike<'py, T, D, AllowTypeChange> = object.extract()?;
+        memory::expect_copies((array.len() * size_of::<T>()) as u64)?;
+        Ok(Self(array))
     }
 }
 

@@ -11,6 +11,7 @@ use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::desparsify::segments;
 use crate::error::{InvalidParameter, enter, to_python};
 use crate::job::Job;
+use crate::memory;
 use crate::ranges;
 use crate::skinning::Stack;
 use crate::weights::Weights;
@@ -97,13 +98,16 @@ fn input(
     bone_parents: &Vector<'_, i32>,
     settings: Settings,
 ) -> PyResult<Input> {
-    Ok(Input {
+    let input = Input {
         positions: triples(positions, "positions")?,
         triangles: triples(triangles, "triangles")?,
         segments: segments(bone_segments)?,
         parents: entries(bone_parents),
         settings,
-    })
+    };
+    let bytes = memory::of_automatic(&input.positions, settings.resolution, input.segments.len());
+    memory::expect("Automatic weights", bytes)?;
+    Ok(input)
 }
 
 fn method_name(method: Method) -> &'static str {

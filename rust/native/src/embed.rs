@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::memory;
 use crate::ranges;
 use crate::weights::Weights;
 
@@ -79,7 +80,7 @@ impl Input {
         method: &str,
         donor: Option<DonorInput>,
     ) -> PyResult<Self> {
-        Ok(Self {
+        let input = Self {
             positions: triples(positions, "positions")?,
             triangles: triples(triangles, "triangles")?,
             heads: triples(heads, "template_heads")?,
@@ -87,7 +88,10 @@ impl Input {
             parents: entries(parents),
             method: method_of(method)?,
             donor,
-        })
+        };
+        let of_donor = input.donor.as_ref().map_or(0, |donor| donor.positions.len());
+        memory::expect("Embedding a skeleton", memory::of_embedding(input.positions.len(), of_donor))?;
+        Ok(input)
     }
 
     fn run(&self, progress: &Progress) -> skinwright_core::Result<core::Embedding> {

@@ -7,6 +7,7 @@ use skinwright_core::{Progress, Weld};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::memory;
 use crate::ranges;
 
 /// Fills in what is not known. `kinds` (V,): 0 free, 1 fixed, 2 soft. `rows` (V, C) hold the known values, `confidence` (V,)
@@ -28,6 +29,7 @@ pub fn fill<'py>(
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
     let shape = [positions.len(), rows.shape()[1]];
     expect_entries("rows", rows.shape()[0], shape[0])?;
+    memory::expect("Filling in", memory::of_fill(shape[0], shape[1]))?;
     let constraints = constraints(&entries(&kinds), confidence.map(|b| entries(&b)))?;
     let weld = weld.map(|weld| weld_of(&entries(&weld), shape[0])).transpose()?;
     let rows: Vec<f64> = rows.as_array().iter().copied().collect();

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use glam::DVec3;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
@@ -40,6 +41,15 @@ pub fn expect(work: &str, bytes: u64) -> PyResult<()> {
     })
 }
 
+/// Raises MemoryError unless an argument of so many bytes can be copied: Rust ends the process where it cannot.
+pub fn expect_copies(bytes: u64) -> PyResult<()> {
+    let total = usize::try_from(bytes.saturating_mul(3).saturating_add(1 << 20)).unwrap_or(usize::MAX);
+    Vec::<u8>::new().try_reserve_exact(total).map_err(|_| {
+        let megabytes = bytes.div_ceil(1 << 20);
+        PyMemoryError::new_err(format!("an array of {megabytes} MiB cannot be copied: close other programs"))
+    })
+}
+
 /// Of a source with its search tree: vertices and triangles.
 pub fn of_source(vertices: usize, triangles: usize) -> u64 {
     200 * vertices as u64 + 250 * triangles as u64
@@ -65,4 +75,72 @@ pub fn of_sculpt(vertices: usize) -> u64 {
 /// Of desparsification to `n` members.
 pub fn of_desparsify(vertices: usize, n: usize) -> u64 {
     200 * vertices as u64 + 100 * vertices as u64 * n as u64
+}
+
+/// Of automatic weights over `bones` bones: measured 1,800 bytes per vertex (grids of 3,600 to 160,000), and 6 per bone and
+/// cell of the box around the mesh.
+pub fn of_automatic(positions: &[[f32; 3]], resolution: f64, bones: usize) -> u64 {
+    let (size, diagonal) = extent(positions);
+    let cells = cells(size, diagonal / resolution).min(2e7) as u64;
+    2_000 * positions.len() as u64 + cells * (40 + 8 * bones as u64)
+}
+
+/// Of embedding a skeleton, whose places are found on a lattice of the inside, from a character of `donor` vertices or none.
+pub fn of_embedding(vertices: usize, donor: usize) -> u64 {
+    (64 << 20) + 1_000 * vertices as u64 + 3_000 * donor as u64
+}
+
+/// Of retargeting: measured 1,000 to 2,200 bytes per vertex of both characters, and 20 to 40 more per eigenpair.
+pub fn of_retarget(source: usize, target: usize, pairs: usize) -> u64 {
+    2_500 * (source + target) as u64 + 40 * pairs as u64 * (source + target) as u64
+}
+
+/// Of a refiner: measured 1,000 bytes per vertex and 470 per tetrahedron, of which there are 12 to a cell.
+pub fn of_refiner(positions: &[[f32; 3]], triangles: &[[u32; 3]], cell: Option<f64>) -> u64 {
+    let cell = cell.unwrap_or(extent(positions).1 * 0.015);
+    let within = |t: &&[u32; 3]| t.iter().all(|&i| (i as usize) < positions.len());
+    let corner = |i: u32| DVec3::from(positions[i as usize].map(f64::from));
+    let (mut volume, mut area) = (0.0, 0.0);
+    for t in triangles.iter().filter(within) {
+        let [a, b, c] = t.map(corner);
+        volume += a.dot(b.cross(c)) / 6.0;
+        area += (b - a).cross(c - a).length() / 2.0;
+    }
+    let cells = volume.abs() / cell.powi(3) + 1.5 * area / cell.powi(2);
+    1_500 * positions.len() as u64 + (6_000.0 * cells.min(1e12)) as u64
+}
+
+/// Of a solve for `columns` values per vertex, none of which needs to be known.
+pub fn of_fill(vertices: usize, columns: usize) -> u64 {
+    of_solve(vertices, vertices) + 40 * vertices as u64 * columns as u64
+}
+
+/// Of depths of `points` in as many poses as are given, below a surface of so many triangles.
+pub fn of_penetration(points: usize, poses: usize, triangles: usize) -> u64 {
+    8 * points as u64 * poses as u64 + 500 * triangles as u64
+}
+
+/// Of posing, which makes a copy of positions and weights.
+pub fn of_skinning(vertices: usize) -> u64 {
+    120 * vertices as u64
+}
+
+/// Of a look for intersections.
+pub fn of_pairs(triangles: usize) -> u64 {
+    400 * triangles as u64
+}
+
+/// Size of the bounding box and length of its diagonal; nothing if a position is not finite.
+fn extent(positions: &[[f32; 3]]) -> (DVec3, f64) {
+    let places = positions.iter().map(|&p| DVec3::from(p.map(f64::from)));
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = places.fold(empty, |(low, high), p| (low.min(p), high.max(p)));
+    let size = high - low;
+    if size.is_finite() { (size, size.length()) } else { (DVec3::ZERO, 0.0) }
+}
+
+/// Cubes of an edge in a box; there is always one.
+fn cells(size: DVec3, edge: f64) -> f64 {
+    let along = |length: f64| if edge > 0.0 { length / edge + 3.0 } else { 1.0 };
+    along(size.x) * along(size.y) * along(size.z)
 }

@@ -6,6 +6,7 @@ use skinwright_core::penetration::{Skinned, depths_in_poses};
 
 use crate::arrays::{Matrix, Stack, triples};
 use crate::error::{InvalidParameter, enter};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::pose;
 use crate::weights::Weights;
@@ -32,6 +33,8 @@ pub fn penetration<'py>(
     if bones == 0 || matrices.len() % bones != 0 {
         return Err(InvalidParameter::new_err(format!("{} matrices are not poses of {bones} bones", matrices.len())));
     }
+    let poses_of = matrices.len() / bones;
+    memory::expect("Measuring depths", memory::of_penetration(rest.len(), poses_of, triangles.len()))?;
     let poses: Vec<_> = matrices.chunks(bones).map(<[_]>::to_vec).collect();
     let body = Skinned { rest: &body_rest, weights: &body_weights };
     let garment = Skinned { rest: &rest, weights: &weights };

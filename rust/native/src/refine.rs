@@ -11,7 +11,8 @@ use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked};
+use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked, to_python};
+use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
 use crate::weights::Weights;
@@ -59,6 +60,8 @@ impl Refiner {
         let (weights, parents) = (weights.to_core(py)?, entries(&bone_parents));
         let segments = segments(&bone_segments)?;
         let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };
+        settings.check().map_err(to_python)?;
+        memory::expect("Preparing the refinement", memory::of_refiner(&positions, &triangles, cell))?;
         let build = || {
             let mesh = TriMesh::new(&positions, &triangles, "character")?;
             core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())
@@ -168,6 +171,7 @@ pub fn intersecting_pairs<'py>(
     #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
+    memory::expect("Looking for intersections", memory::of_pairs(triangles.len()))?;
     let find = || {
         TriMesh::new(&positions, &triangles, "character")?;
         Ok(core::intersecting_pairs(&positions, &triangles))

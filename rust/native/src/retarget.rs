@@ -9,6 +9,7 @@ use skinwright_core::{Progress, TriMesh};
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::job::Job;
+use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, vectors};
 use crate::weights::Weights;
@@ -44,6 +45,12 @@ struct Owned {
 }
 
 impl Inputs {
+    fn expect_memory(&self) -> PyResult<()> {
+        let pairs = if self.settings.method == Method::Biharmonic { self.settings.n_pairs } else { 0 };
+        let bytes = memory::of_retarget(self.source.positions.len(), self.target.positions.len(), pairs);
+        memory::expect("Retargeting", bytes)
+    }
+
     fn run(&self, progress: &Progress) -> skinwright_core::Result<core::Retarget> {
         let source = TriMesh::new(&self.source.positions, &self.source.triangles, self.source.what)?;
         let target = TriMesh::new(&self.target.positions, &self.target.triangles, self.target.what)?;
@@ -135,6 +142,7 @@ macro_rules! retarget_function {
                 landmarks: landmarks.map(|pairs| landmarks_of(&pairs)).transpose()?.unwrap_or_default(),
                 settings,
             };
+            inputs.expect_memory()?;
             $finish(py, threads, inputs)
         }
     };

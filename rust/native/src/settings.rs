@@ -57,6 +57,7 @@ pub(crate) fn keywords(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<(Settin
             "relative_max_distance" => settings.max_distance = Length::Relative(share(name, &value, 10.0)?),
             "max_normal_angle" => settings.max_normal_angle = share(name, &value, PI)?,
             "match_flipped_normals" => settings.match_flipped_normals = value.extract()?,
+            "average_ties" => settings.average_ties = value.extract()?,
             "relative_weld_tolerance" => settings.weld_tolerance = Length::Relative(share(name, &value, 0.01)?),
             "mask" => mask = mask_values(value.extract()?)?,
             "smoothness_length" => smoothness_length = length(name, &value)?,

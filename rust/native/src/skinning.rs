@@ -8,6 +8,7 @@ use skinwright_core::skinning as core;
 pub use crate::arrays::Stack;
 use crate::arrays::{Matrix, triples};
 use crate::error::{InvalidParameter, enter, to_python};
+use crate::memory;
 use crate::ranges;
 use crate::weights::Weights;
 
@@ -42,6 +43,7 @@ pub fn linear_blend<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (rest, pose) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
     let weights = weights.to_core(py)?;
+    memory::expect("Posing", memory::of_skinning(rest.len()))?;
     vectors(py, enter(py, threads, || core::linear_blend(&rest, &weights, &pose))?)
 }
 
@@ -59,5 +61,6 @@ pub fn dual_quaternion_blend<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (rest, matrices) = (triples(&rest_positions, "rest_positions")?, pose(&pose_from_rest)?);
     let (weights, bones) = (weights.to_core(py)?, rest_bones.as_ref().map(pose).transpose()?);
+    memory::expect("Posing", memory::of_skinning(rest.len()))?;
     vectors(py, enter(py, threads, || core::dual_quaternion_blend(&rest, &weights, &matrices, bones.as_deref()))?)
 }

@@ -91,7 +91,7 @@ impl Source {
 #[pyo3(signature = (source_positions, source_triangles, source_weights, target_positions, target_triangles, *,
     target_edges=None, threads=0, **settings),
     text_signature = "(source_positions, source_triangles, source_weights, target_positions, target_triangles, *, \
-    target_edges=None, method='paper', softness=0.7, max_distance=None, relative_max_distance=0.05, max_normal_angle=0.6108652381980153, match_flipped_normals=True, \
+    target_edges=None, method='paper', softness=0.7, max_distance=None, relative_max_distance=0.05, max_normal_angle=0.6108652381980153, match_flipped_normals=True, average_ties=False, \
     mask=None, relative_weld_tolerance=1e-06, smoothness_length=None, relative_smoothness_length=0.05, smoothing_iterations=0, \
     smoothing_factor=0.2, max_influences=0, island_policy='bridge', small_islands='auto', threads=0)")]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]

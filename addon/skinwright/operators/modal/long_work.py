@@ -5,7 +5,7 @@ from typing import Any
 from bpy.types import Context, Event, Operator
 
 from ... import jobs, reporting
-from ...errors import Refused, internal
+from ...errors import Refused, sentence
 from . import timers
 
 TICK_SECONDS = 0.05
@@ -54,11 +54,11 @@ class LongWork(Operator):
             return self._failed(error)
 
     def _failed(self, error: BaseException) -> set[str]:
-        sentence = str(error) if isinstance(error, Refused) else f"{self.bl_label}: {internal(error)}"
+        text = sentence(self.bl_label, error)
         if isinstance(error, ReferenceError):
-            sentence = f"{self.bl_label}: an object was deleted while it worked, so nothing was written"
-        reporting.remember(self.bl_label, sentence, failed=True)
-        self.report({"ERROR"}, sentence)
+            text = f"{self.bl_label}: an object was deleted while it worked, so nothing was written"
+        reporting.remember(self.bl_label, text, failed=True)
+        self.report({"ERROR"}, text)
         return {"CANCELLED"}
 
     def cancel(self, context: Context) -> None:

@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 from bpy.types import Context
 
 from ... import preferences, reporting
-from ...errors import Refused, internal
+from ...errors import sentence
 from ...refine import live
 from ...registration import registration
 from ...scene import armature
@@ -64,8 +64,8 @@ def _attempt(step: Callable[[], object]) -> None:
         step()
     except Exception as error:
         live.stop()
-        sentence = str(error) if isinstance(error, Refused) else internal(error)
-        reporting.remember(SKINWRIGHT_OT_live_refine.bl_label, f"The preview has ended: {sentence}", failed=True)
+        label = SKINWRIGHT_OT_live_refine.bl_label
+        reporting.remember(label, f"The preview has ended: {sentence(label, error)}", failed=True)
 
 
 @persistent

@@ -1,6 +1,7 @@
 //! One volume for a whole joint: what sub-steps and membrane have lost is blown up again where nothing touches.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::coupling::{place, shift};
 use super::joints::Member;
@@ -10,6 +11,10 @@ use super::local::Local;
 const ROUNDS: usize = 8;
 /// Passes that fade the weight towards contacts and the ends of the region.
 const FADING: usize = 8;
+/// Rounds that keep the directions of the first of them.
+const SAME_NORMALS: usize = 4;
+/// Triangles that one task takes.
+const RUN: usize = 2048;
 /// Farthest that a round moves skin, in radii.
 const STEP: f32 = 0.08;
 
@@ -43,9 +48,12 @@ impl Balloon {
 
     /// Six times the volume between the skin and `apex`. The ends of the region move rigidly about the joint, so that what
     /// they and the apex span does not change.
-    pub(super) fn volume(&self, apex: Vec3, at: impl Fn(u32) -> Vec3) -> f64 {
+    pub(super) fn volume(&self, apex: Vec3, at: impl Fn(u32) -> Vec3 + Sync) -> f64 {
         let corner = |p: u32| (at(p) - apex).as_dvec3();
-        self.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum()
+        let part = |&[a, b, c]: &[u32; 3]| corner(a).dot(corner(b).cross(corner(c)));
+        // Sums of runs in their order: the same for any number of threads.
+        let runs = self.triangles.par_chunks(RUN).map(|run| run.iter().map(part).sum());
+        runs.collect::<Vec<f64>>().iter().sum()
     }
 
     /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round.
@@ -58,16 +66,13 @@ impl Balloon {
         mut limit: impl FnMut(&mut Local),
     ) {
         let mut normals = vec![Vec3::ZERO; local.particles.len()];
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let missing = target - self.volume(apex, |p| place(&local.particles[p as usize]));
             if missing.abs() < 1e-5 * target.abs() {
                 return;
             }
-            self.vertices.iter().for_each(|&p| normals[p as usize] = Vec3::ZERO);
-            for t in &self.triangles {
-                let [a, b, c] = t.map(|p| place(&local.particles[p as usize]));
-                let doubled = (b - a).cross(c - a);
-                t.iter().for_each(|&p| normals[p as usize] += doubled);
+            if round % SAME_NORMALS == 0 {
+                self.normals(local, &mut normals);
             }
             let swept: f64 = self.sum(|p, w| f64::from(w * normals[p as usize].length()));
             let step = (missing / swept.max(1e-12)) as f32;
@@ -76,6 +81,16 @@ impl Balloon {
                 shift(&mut local.particles[p as usize], normals[p as usize].normalize_or_zero() * (w * step));
             }
             limit(local);
+        }
+    }
+
+    /// Sums of the doubled areas around each vertex.
+    fn normals(&self, local: &Local, normals: &mut [Vec3]) {
+        self.vertices.iter().for_each(|&p| normals[p as usize] = Vec3::ZERO);
+        for t in &self.triangles {
+            let [a, b, c] = t.map(|p| place(&local.particles[p as usize]));
+            let doubled = (b - a).cross(c - a);
+            t.iter().for_each(|&p| normals[p as usize] += doubled);
         }
     }
 

@@ -6,12 +6,16 @@ use std::collections::HashSet;
 use glam::Vec3;
 
 use super::pairs::{intersecting_pairs, intersecting_pairs_of};
+use super::region::Region;
 use super::surface::Surface;
 
-/// Rounds of pushing.
-const ROUNDS: usize = 40;
-/// Rounds without fewer pairs after which there is no hope.
+/// Rounds of pushing without fewer pairs, after which another width is tried.
 const STALLED: usize = 5;
+/// How many rings around are smoothed, in the order they are tried: a fold is wider than it looks, and skin that is
+/// pressed against what may not move gets worse by smoothing.
+const WIDTHS: [usize; 5] = [1, 0, 2, 3, 4];
+/// The widest smoothing, as a share of how far skin may move: edges of coarse skin are longer, and a ring of them is a limb.
+const WIDEST: f32 = 1.4;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
 const STEP: f32 = 0.15;
 /// How far a round moves them and the ring around towards the mean of their neighbours.
@@ -26,11 +30,57 @@ pub(super) struct Contact {
 }
 
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
-pub(super) struct Skin<'a> {
-    pub(super) triangles: &'a [[u32; 3]],
-    pub(super) names: &'a (dyn Fn(u32) -> u32 + Sync),
-    pub(super) ring: &'a dyn Fn(u32) -> &'a [u32],
-    pub(super) is_free: &'a dyn Fn(u32) -> bool,
+pub(super) trait Skin: Sync {
+    fn triangles(&self) -> &[[u32; 3]];
+    fn name(&self, triangle: u32) -> u32;
+    fn ring(&self, vertex: u32) -> &[u32];
+    fn is_free(&self, vertex: u32) -> bool;
+    /// The connected component of a triangle.
+    fn island(&self, triangle: u32) -> u32;
+}
+
+impl Skin for Surface {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn name(&self, triangle: u32) -> u32 {
+        triangle
+    }
+
+    fn ring(&self, vertex: u32) -> &[u32] {
+        self.ring(vertex as usize)
+    }
+
+    fn is_free(&self, _vertex: u32) -> bool {
+        true
+    }
+
+    fn island(&self, triangle: u32) -> u32 {
+        self.island[self.triangles[triangle as usize][0] as usize]
+    }
+}
+
+impl Skin for Region {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn name(&self, triangle: u32) -> u32 {
+        self.triangle_names[triangle as usize]
+    }
+
+    fn ring(&self, vertex: u32) -> &[u32] {
+        self.ring(vertex)
+    }
+
+    fn is_free(&self, vertex: u32) -> bool {
+        self.is_free(vertex)
+    }
+
+    fn island(&self, triangle: u32) -> u32 {
+        self.triangle_islands[triangle as usize]
+    }
 }
 
 impl Contact {
@@ -39,58 +89,88 @@ impl Contact {
         Self { at_rest: intersecting_pairs(&rest, &surface.triangles).into_iter().collect() }
     }
 
-    fn pairs(&self, skin: &Skin<'_>, places: &[Vec3], among: Option<&[u32]>) -> Vec<[u32; 2]> {
-        let at = |i: u32| places[i as usize];
-        let mut pairs = intersecting_pairs_of(&at, skin.triangles, among);
+    /// The pairs of all of the skin's triangles that do not intersect at rest.
+    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3]) -> Vec<[u32; 2]> {
+        self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>())
+    }
+
+    /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
+    /// which is the outer one cannot be told: pushing and smoothing would eat them up.
+    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
+        let mut pairs = self.pairs(skin, places, among);
+        pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
+        pairs
+    }
+
+    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among);
         pairs.retain(|&[a, b]| {
-            let [a, b] = [(skin.names)(a), (skin.names)(b)];
+            let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
         });
         pairs
     }
 
-    /// Pushes until no pair of triangles intersects that does not at rest; if some remain, the round with the fewest counts.
-    /// Returns the vertices that moved, ascending.
-    pub(super) fn part(&self, skin: &Skin<'_>, places: &mut Vec<Vec3>) -> Vec<u32> {
-        let mut pairs = self.pairs(skin, places, None);
+    /// Pushes until no pair of the `suspects` intersects that does not at rest; if some remain, the round with the fewest counts.
+    /// Returns the vertices that moved, ascending, and the number of pairs that remain.
+    ///
+    /// No vertex moves farther than `farthest`: where whole layers of cloth lie in each other, smoothing would go on until
+    /// nothing is left of them.
+    pub(super) fn part(
+        &self,
+        skin: &dyn Skin,
+        places: &mut Vec<Vec3>,
+        suspects: &[u32],
+        farthest: f32,
+    ) -> (Vec<u32>, usize) {
+        let mut pairs = self.own_pairs(skin, places, suspects);
         if pairs.is_empty() {
-            return Vec::new();
+            return (Vec::new(), 0);
         }
         let around = grown(skin, corners(skin, &pairs), RINGS);
         let near: HashSet<u32> = around.iter().copied().collect();
-        let among: Vec<u32> = (0..skin.triangles.len() as u32)
-            .filter(|&t| skin.triangles[t as usize].iter().any(|i| near.contains(i)))
+        let among: Vec<u32> = (0..skin.triangles().len() as u32)
+            .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
             .collect();
-        let mut now = places.clone();
-        let (mut fewest, mut moved, mut stalled) = (pairs.len(), Vec::new(), 0);
-        for _ in 0..ROUNDS {
-            moved.extend(push(skin, &mut now, &pairs));
-            pairs = self.pairs(skin, &now, Some(&among));
-            stalled += 1;
-            if pairs.len() < fewest {
-                (fewest, stalled) = (pairs.len(), 0);
-                places.clone_from(&now);
-            }
-            if pairs.is_empty() || stalled == STALLED {
-                break;
+        let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().max(1.0) as usize;
+        let (start, mut moved) = (places.clone(), Vec::new());
+        for rings in WIDTHS.into_iter().filter(|&rings| rings <= most_rings) {
+            let (mut now, mut left, mut stalled) = (places.clone(), pairs.clone(), 0);
+            while stalled < STALLED && !pairs.is_empty() {
+                let pushed = push(skin, &mut now, &left, rings);
+                for &i in &pushed {
+                    let from = start[i as usize];
+                    now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
+                }
+                moved.extend(pushed);
+                left = self.own_pairs(skin, &now, &among);
+                stalled += 1;
+                if left.len() < pairs.len() {
+                    stalled = 0;
+                    pairs.clone_from(&left);
+                    places.clone_from(&now);
+                }
+                if left.is_empty() {
+                    break;
+                }
             }
         }
         moved.sort_unstable();
         moved.dedup();
-        moved
+        (moved, pairs.len())
     }
 }
 
-fn corners(skin: &Skin<'_>, pairs: &[[u32; 2]]) -> Vec<u32> {
-    let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles[t as usize]).collect();
+fn corners(skin: &dyn Skin, pairs: &[[u32; 2]]) -> Vec<u32> {
+    let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles()[t as usize]).collect();
     corners.sort_unstable();
     corners.dedup();
     corners
 }
 
-fn grown(skin: &Skin<'_>, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
+fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
     for _ in 0..rings {
-        let ring: Vec<u32> = vertices.iter().flat_map(|&i| (skin.ring)(i)).copied().collect();
+        let ring: Vec<u32> = vertices.iter().flat_map(|&i| skin.ring(i)).copied().collect();
         vertices.extend(ring);
         vertices.sort_unstable();
         vertices.dedup();
@@ -98,40 +178,53 @@ fn grown(skin: &Skin<'_>, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
     vertices
 }
 
-/// One round: the triangles of a pair move apart along the difference of their normals, then they and the ring around are
-/// smoothed. Returns what moved.
-fn push(skin: &Skin<'_>, places: &mut [Vec3], pairs: &[[u32; 2]]) -> Vec<u32> {
-    let triangle = |t: u32| skin.triangles[t as usize];
+/// One round: the triangles of a pair move apart along the difference of their normals, then they and some `rings` around
+/// are smoothed as many times: a fold that stays is wider than it looks. Returns what moved.
+fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) -> Vec<u32> {
+    let triangle = |t: u32| skin.triangles()[t as usize];
     let normal = |t: u32| {
         let [a, b, c] = triangle(t).map(|i| places[i as usize]);
         (b - a).cross(c - a).normalize_or_zero()
     };
     let touched = corners(skin, pairs);
     let mut pushes = vec![Vec3::ZERO; touched.len()];
-    let mut length = 0.0;
     for &[a, b] in pairs {
         let apart = (normal(b) - normal(a)).normalize_or_zero();
         for (t, by) in [(a, apart), (b, -apart)] {
             for i in triangle(t) {
                 pushes[touched.binary_search(&i).expect("a corner")] += by;
             }
-            let [i, j, _] = triangle(t).map(|i| places[i as usize]);
-            length += i.distance(j);
         }
     }
-    let step = STEP * length / (2 * pairs.len()) as f32;
-    for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| (skin.is_free)(**i)) {
+    let step = STEP * mean_edge(skin, places, pairs);
+    for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by.normalize_or_zero() * step;
     }
-    let near = grown(skin, touched, 1);
+    let near = grown(skin, touched, rings);
+    for _ in 0..rings {
+        smooth(skin, places, &near);
+    }
+    near
+}
+
+/// The mean length of edges of triangles that pass through each other.
+fn mean_edge(skin: &dyn Skin, places: &[Vec3], pairs: &[[u32; 2]]) -> f32 {
+    let edge = |&t: &u32| {
+        let [i, j, _] = skin.triangles()[t as usize].map(|i| places[i as usize]);
+        i.distance(j)
+    };
+    let sum: f32 = pairs.as_flattened().iter().map(edge).sum();
+    (sum / (2 * pairs.len()) as f32).max(f32::MIN_POSITIVE)
+}
+
+fn smooth(skin: &dyn Skin, places: &mut [Vec3], vertices: &[u32]) {
     let mean = |&i: &u32| {
-        let ring = (skin.ring)(i);
+        let ring = skin.ring(i);
         let sum: Vec3 = ring.iter().map(|&n| places[n as usize]).sum();
         if ring.is_empty() { Vec3::ZERO } else { (sum / ring.len() as f32 - places[i as usize]) * SMOOTHING }
     };
-    let moves: Vec<Vec3> = near.iter().map(mean).collect();
-    for (&i, by) in near.iter().zip(moves).filter(|(i, _)| (skin.is_free)(**i)) {
+    let moves: Vec<Vec3> = vertices.iter().map(mean).collect();
+    for (&i, by) in vertices.iter().zip(moves).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by;
     }
-    near
 }

@@ -1,47 +1,72 @@
 //! Skin follows the lattice it hangs in, and the lattice follows its skin.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
+use super::joints::Member;
 use super::local::Local;
 use super::projection::Particle;
 
-/// Moves skin by what its lattice nodes moved since `before` (the nodes' particles then).
-pub(super) fn carry_skin(local: &mut Local, before: &[Particle]) {
-    for hung in &local.hung {
-        let mut moved = Vec3::ZERO;
-        for (&node, &share) in hung.nodes.iter().zip(&hung.shares) {
-            moved += share * (place(&local.particles[node as usize]) - place(&before[node as usize]));
+/// Moves skin by what its lattice nodes moved since `before` (the nodes' particles then), then by `share` of the way to its
+/// place in the lattice, so that the two do not part.
+pub(super) fn carry_skin(local: &mut Local, before: &[Particle], share: f32) {
+    let (nodes, skin) = local.particles.split_at_mut(before.len());
+    let (first, hung) = (before.len(), &local.region.hung);
+    let of_run = |(run, skin): (usize, &mut [Particle])| {
+        let first = first + run * RUN;
+        let from = hung.partition_point(|hung| (hung.vertex as usize) < first);
+        let to = hung.partition_point(|hung| (hung.vertex as usize) < first + RUN);
+        for hung in &hung[from..to] {
+            let (mut moved, mut held) = (Vec4::ZERO, Vec4::ZERO);
+            for (&node, &share) in hung.nodes.iter().zip(&hung.shares) {
+                let now = Vec4::from(nodes[node as usize]);
+                moved += share * (now - Vec4::from(before[node as usize]));
+                held += share * now;
+            }
+            let particle = &mut skin[hung.vertex as usize - first];
+            shift(particle, moved.truncate());
+            let away = held.truncate() - place(particle);
+            shift(particle, away * share);
         }
-        shift(&mut local.particles[hung.vertex as usize], moved);
-    }
+    };
+    skin.par_chunks_mut(RUN).enumerate().for_each(of_run);
 }
 
 /// Moves lattice nodes by the mean of what the skin around them moved since `before` (the skin's particles then).
 pub(super) fn carry_lattice(local: &mut Local, before: &[Particle]) {
-    let mut sums = vec![(Vec3::ZERO, 0.0f32); local.nodes];
-    for hung in &local.hung {
+    let mut sums = vec![Vec4::ZERO; local.nodes];
+    for hung in &local.region.hung {
         let vertex = hung.vertex as usize;
-        let moved = place(&local.particles[vertex]) - place(&before[vertex - local.nodes]);
+        let moved = Vec4::from(local.particles[vertex]) - Vec4::from(before[vertex - local.nodes]);
+        // The fourth is the sum of the shares.
+        let moved = moved.truncate().extend(1.0);
         for (&node, &share) in hung.nodes.iter().zip(&hung.shares) {
-            let sum = &mut sums[node as usize];
-            (sum.0, sum.1) = (sum.0 + share * moved, sum.1 + share);
+            sums[node as usize] += share * moved;
         }
     }
-    for (node, (moved, share)) in sums.into_iter().enumerate() {
-        if share > 1e-6 {
-            shift(&mut local.particles[node], moved / share);
+    for (node, sum) in sums.into_iter().enumerate() {
+        if sum.w > 1e-6 {
+            shift(&mut local.particles[node], sum.truncate() / sum.w);
         }
     }
 }
 
-/// Pulls skin back to its place in the lattice by `share` of the way, so that the two do not part.
-pub(super) fn rejoin(local: &mut Local, share: f32) {
-    for hung in &local.hung {
-        let nodes = hung.nodes.iter().zip(&hung.shares);
-        let held: Vec3 = nodes.map(|(&node, &b)| b * place(&local.particles[node as usize])).sum();
-        let away = held - place(&local.particles[hung.vertex as usize]);
-        shift(&mut local.particles[hung.vertex as usize], away * share);
-    }
+/// Particles that one task moves.
+const RUN: usize = 2048;
+
+/// Moves each of `members` (ascending) by what `by` says of its place, if it is free.
+pub(super) fn shift_members(particles: &mut [Particle], members: &[Member], by: impl Fn(Vec3, &Member) -> Vec3 + Sync) {
+    let of_run = |(run, particles): (usize, &mut [Particle])| {
+        let first = run * RUN;
+        let from = members.partition_point(|m| (m.particle as usize) < first);
+        let to = members.partition_point(|m| (m.particle as usize) < first + RUN);
+        for member in &members[from..to] {
+            let particle = &mut particles[member.particle as usize - first];
+            let by = by(place(particle), member);
+            shift(particle, by);
+        }
+    };
+    particles.par_chunks_mut(RUN).enumerate().for_each(of_run);
 }
 
 pub(super) fn place(particle: &Particle) -> Vec3 {

@@ -12,6 +12,8 @@ const LEAST_ANGLE: f64 = 5.0;
 const MOST_BEND: f32 = 2.5;
 /// What a joint's region reaches beyond the crease, in radii.
 const MARGIN: f32 = 1.2;
+/// Reaches are multiples of this many radii, so that poses near each other have one region.
+const STEP: f32 = 0.25;
 /// Gap on each side of the plane, in radii, for a joint that has turned by a right angle or more.
 const GAP: f32 = 0.016;
 
@@ -32,7 +34,8 @@ pub(super) fn active_joints<'a>(joints: &'a [Joint], path: &Path<'_>, pose: &[DA
         let [up, down] = posed_axis(joint, pose).directions;
         let bend = (-up).angle_between(down).min(MOST_BEND);
         let twist = (path.angle(joint.bone) - path.swing_angle(joint.bone)).max(0.0) as f32;
-        let reach = joint.radius * ((bend / 2.0).tan() + MARGIN + twist / std::f32::consts::PI);
+        let radii = (bend / 2.0).tan() + MARGIN + twist / std::f32::consts::PI;
+        let reach = joint.radius * (radii / STEP).ceil() * STEP;
         ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32 }
     };
     joints.iter().filter(turns).map(active).collect()

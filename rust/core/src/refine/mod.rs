@@ -14,21 +14,22 @@ mod frame;
 mod joints;
 mod lattice;
 mod local;
+mod morton;
 mod node_weights;
 pub mod number;
 mod pairs;
 mod predictor;
 mod prepared;
 pub mod projection;
+mod region;
 mod report;
 mod settings;
 mod skeleton;
 mod solver;
 mod surface;
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
-use self::contact::Skin;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 use self::projection::Kernel;
@@ -39,6 +40,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
+
+/// What keeping limbs apart may cost of the volume.
+const MOST_LOST: f64 = 0.02;
 
 /// A character prepared for refinement: any number of poses, in any order.
 ///
@@ -173,14 +177,15 @@ impl Refiner {
     /// Limb against limb, limb against torso: over the whole skin, once more.
     fn part_limbs(&self, positions: &mut [[f32; 3]]) {
         let surface = &self.prepared.surface;
-        let skin = Skin {
-            triangles: &surface.triangles,
-            names: &|t| t,
-            ring: &|i| surface.ring(i as usize),
-            is_free: &|_| true,
-        };
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
-        if self.prepared.contact.part(&skin, &mut places).is_empty() {
+        let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        let before = self.lost(&places);
+        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
+            return;
+        }
+        // Layers of cloth can be smoothed away; they had better pass through each other.
+        if self.lost(&places) > before.max(MOST_LOST) {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
@@ -189,6 +194,16 @@ impl Refiner {
                 *position = at.to_array();
             }
         }
+    }
+
+    /// By how much the volume of the skin at `places` (welded) differs from rest, as a share.
+    fn lost(&self, places: &[Vec3]) -> f64 {
+        let surface = &self.prepared.surface;
+        let volume = |at: &dyn Fn(u32) -> DVec3| -> f64 {
+            surface.triangles.iter().map(|t| t.map(at)).map(|[a, b, c]| a.dot(b.cross(c))).sum()
+        };
+        let now = volume(&|i| places[i as usize].as_dvec3());
+        (now / volume(&|i| surface.rest[i as usize]) - 1.0).abs()
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.

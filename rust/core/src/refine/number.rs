@@ -9,23 +9,30 @@ pub const LANES: usize = 8;
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// A constant.
-    fn constant(value: f32) -> Self;
+    /// A constant of the same kind: wide numbers carry the proof that their instructions exist.
+    fn constant(self, value: f32) -> Self;
     /// The square root.
     fn sqrt(self) -> Self;
+    /// The lesser of two numbers, neither of which may be NaN.
+    fn lesser(self, other: Self) -> Self;
 }
 
 macro_rules! scalar {
     ($kind:ty) => {
         impl Number for $kind {
             #[inline(always)]
-            fn constant(value: f32) -> Self {
+            fn constant(self, value: f32) -> Self {
                 Self::from(value)
             }
 
             #[inline(always)]
             fn sqrt(self) -> Self {
                 self.sqrt()
+            }
+
+            #[inline(always)]
+            fn lesser(self, other: Self) -> Self {
+                if self < other { self } else { other }
             }
         }
     };
@@ -74,7 +81,7 @@ impl Neg for Lanes {
 
 impl Number for Lanes {
     #[inline(always)]
-    fn constant(value: f32) -> Self {
+    fn constant(self, value: f32) -> Self {
         Self([value; LANES])
     }
 
@@ -82,6 +89,14 @@ impl Number for Lanes {
     fn sqrt(mut self) -> Self {
         for lane in 0..LANES {
             self.0[lane] = self.0[lane].sqrt();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn lesser(mut self, other: Self) -> Self {
+        for lane in 0..LANES {
+            self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
         }
         self
     }

@@ -7,6 +7,7 @@ use super::joints::{Joint, joints};
 use super::lattice::Lattice;
 use super::node_weights::particle_weights;
 use super::projection::Colouring;
+use super::region::KeptRegion;
 use super::settings::Settings;
 use super::skeleton::Skeleton;
 use super::surface::Surface;
@@ -23,6 +24,11 @@ const LEAST_VOLUME: f64 = 1e-8;
 /// Vertices that a mesh may have: more would take minutes to prepare and gigabytes to keep.
 const MOST_VERTICES: usize = 2_000_000;
 
+/// Volume of every tetrahedron in cells: twelve to a cube, all alike.
+pub(super) const TETRAHEDRON: f32 = 1.0 / 12.0;
+/// Distance of its corners to its centre, a quarter of the root of 5.
+pub(super) const ARM: f32 = 0.559_017;
+
 /// Everything about a character that no pose changes. Lengths are in cells, about the middle of the mesh.
 #[derive(Debug)]
 pub(super) struct Prepared {
@@ -32,19 +38,16 @@ pub(super) struct Prepared {
     pub(super) joints: Vec<Joint>,
     /// What intersects at rest.
     pub(super) contact: Contact,
+    pub(super) kept: KeptRegion,
     /// Places of all particles: lattice nodes, then surface vertices.
     pub(super) rest: Vec<Vec3>,
     /// Weights of all particles.
     pub(super) weights: Weights,
-    pub(super) edge_order: Colouring,
-    pub(super) side_order: Colouring,
-    pub(super) tetrahedron_order: Colouring,
+    pub(super) edge_colours: Colouring,
+    pub(super) side_colours: Colouring,
+    pub(super) tetrahedron_colours: Colouring,
     pub(super) edge_lengths: Vec<f32>,
     pub(super) side_lengths: Vec<f32>,
-    /// Volume of every tetrahedron, and its power 4/3.
-    pub(super) tetrahedron_volume: [f32; 2],
-    /// Distances of tetrahedra's corners to their centres.
-    pub(super) arms: Vec<[f32; 4]>,
     /// What makes cells of mesh units.
     pub(super) middle: DVec3,
     pub(super) cell: f64,
@@ -88,25 +91,17 @@ impl Prepared {
         let joints = joints(&skeleton, &places, &rows, lattice.nodes.len());
         let nodes = lattice.nodes.len() as u32;
         let distance = |[i, j]: [u32; 2]| places[i as usize].distance(places[j as usize]) as f32;
-        let arms = |t: &[u32; 4]| {
-            let corners = t.map(|n| places[n as usize]);
-            let centre = corners.iter().sum::<DVec3>() / 4.0;
-            corners.map(|corner| corner.distance(centre) as f32)
-        };
         let sides: Vec<[u32; 2]> = surface.edges.iter().map(|edge| edge.map(|i| i + nodes)).collect();
-        // Twelve to a cube, all alike.
-        let volume = 1.0f32 / 12.0;
         Self {
-            edge_order: Colouring::new(&lattice.edges, places.len()),
-            side_order: Colouring::new(&sides, places.len()),
-            tetrahedron_order: Colouring::new(&lattice.tetrahedra, places.len()),
+            edge_colours: Colouring::new(&lattice.edges, places.len()),
+            side_colours: Colouring::new(&sides, places.len()),
+            tetrahedron_colours: Colouring::new(&lattice.tetrahedra, places.len()),
             edge_lengths: lattice.edges.iter().map(|&edge| distance(edge)).collect(),
             side_lengths: sides.iter().map(|&side| distance(side)).collect(),
-            tetrahedron_volume: [volume, volume.powf(4.0 / 3.0)],
-            arms: lattice.tetrahedra.iter().map(arms).collect(),
             rest: places.iter().map(|place| place.as_vec3()).collect(),
             weights: csr(&rows, weights.n_bones()),
             contact: Contact::new(&surface),
+            kept: KeptRegion::default(),
             surface,
             lattice,
             skeleton,

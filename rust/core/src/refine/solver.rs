@@ -1,19 +1,20 @@
 //! One frame: the path from rest in sub-angles, each a few projections and a relaxed crease; then the volume.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
-use super::contact::Skin;
-use super::coupling::{carry_lattice, carry_skin, place, rejoin};
+use super::coupling::{carry_lattice, carry_skin, place};
 use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
+use super::joints::Member;
 use super::local::Local;
-use super::predictor::{follow, place_bound, skinned};
-use super::prepared::Prepared;
-use super::projection::{Energy, Kernel, Stretch, Volume, project, untangle};
+use super::predictor::{follow, linear, place_all, place_bound, skinned};
+use super::prepared::{ARM, Prepared, TETRAHEDRON};
+use super::projection::{Flesh, Kernel, Stretch, project, untangle};
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -30,12 +31,10 @@ const KEPT: f32 = 0.3;
 const IN_CONTACT: f32 = 0.04;
 /// Passes over the creases in each iteration.
 const PASSES: usize = 2;
-/// Times that tetrahedra turned inside out are looked for at the end.
-const UNTANGLING: usize = 12;
 /// Loss of a joint's volume from which it is asked whether skinning did better.
 const HARM: f64 = 0.1;
-/// Times that the volume is restored and the folds that this makes are taken out.
-const BALLOONS: usize = 2;
+/// How far, in cells, skin that has come through skin is moved back.
+pub(super) const FARTHEST: f32 = 1.5;
 
 /// Times of the stages, by name, in the order they first ran.
 #[derive(Default)]
@@ -76,7 +75,7 @@ pub(super) fn solve(
     if active.is_empty() {
         return Solution { moved: Vec::new(), report: Report::default() };
     }
-    let local = clock.time("region", || Local::new(prepared, &active));
+    let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     frame.walk(&path, quality);
     frame.finish(pose, quality);
@@ -93,7 +92,7 @@ pub(super) fn measure(
 ) -> Vec<JointMeasure> {
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
-    let local = Local::new(prepared, &active);
+    let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
     let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
@@ -102,6 +101,13 @@ pub(super) fn measure(
         JointMeasure { bone: active[k].joint.bone, volume, bulge }
     };
     frame.axes(pose).iter().enumerate().map(of_joint).collect()
+}
+
+fn flesh(settings: &Settings) -> Flesh {
+    let stiff = TETRAHEDRON.powf(4.0 / 3.0);
+    let volume = (settings.volume > 0.0).then(|| (1.0 / settings.volume - 1.0) as f32 * stiff);
+    let energy = (settings.energy > 0.0).then(|| (1.0 / settings.energy) as f32);
+    Flesh { volume: TETRAHEDRON, arm: ARM, volume_compliance: volume, energy_compliance: energy }
 }
 
 struct Frame<'a> {
@@ -126,111 +132,92 @@ impl Frame<'_> {
         let steps = if bends { ((swing / quality.sub_angle()).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
         let iterations = if bends { quality.iterations() } else { TWIST_ITERATIONS };
         let mut before = path.at(if bends { 0.0 } else { 1.0 });
-        let start = skinned(self.prepared, &self.local, &before);
-        for (particle, place) in self.local.particles.iter_mut().zip(&start) {
-            [particle[0], particle[1], particle[2]] = place.to_array();
-        }
+        place_all(self.prepared, &mut self.local, &before);
         for step in 1..=steps {
             let share = step as f64 / steps as f64;
             let pose = path.at(share);
             let axes = self.axes(&pose);
             let mut clock = std::mem::take(&mut self.clock);
             clock.time("predict", || {
-                let skin = skinned(self.prepared, &self.local, &pose);
                 follow(self.prepared, &mut self.local, &before, &pose);
-                place_bound(&mut self.local, &skin, self.active, &axes);
+                place_bound(&mut self.local, self.active, &axes);
             });
             self.clock = clock;
-            self.restart();
-            for _ in 0..iterations {
-                self.iterate(&axes, share as f32);
+            self.local.restart();
+            for iteration in 1..=iterations {
+                self.iterate(&axes, share as f32, quality == Quality::Bake || iteration == iterations);
             }
             before = pose;
         }
     }
 
-    fn restart(&mut self) {
-        self.local.lattice_stretch.restart();
-        self.local.surface_stretch.restart();
-        self.local.volume.restart();
-        self.local.energy.restart();
-    }
-
-    fn iterate(&mut self, axes: &[Axis], share: f32) {
+    fn iterate(&mut self, axes: &[Axis], share: f32, untangles: bool) {
         let mut clock = std::mem::take(&mut self.clock);
         let nodes = self.local.nodes;
         let before = self.local.particles[..nodes].to_vec();
-        clock.time("project", || self.project_lattice());
-        clock.time("couple", || {
-            carry_skin(&mut self.local, &before);
-            rejoin(&mut self.local, REJOIN);
-        });
+        clock.time("project", || self.project_lattice(untangles));
+        clock.time("couple", || carry_skin(&mut self.local, &before, REJOIN));
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
-        clock.time("crease", || self.limit(axes, share, PASSES));
+        clock.time("crease", || _ = self.limit(axes, share, PASSES));
         clock.time("couple", || carry_lattice(&mut self.local, &skin));
         clock.time("crease", || self.separate(axes, share));
         self.iterations += 1;
         self.clock = clock;
     }
 
-    fn project_lattice(&mut self) {
+    fn project_lattice(&mut self, untangles: bool) {
         let (settings, local, kernel) = (self.settings, &mut self.local, self.kernel);
+        let region = &local.region;
         if settings.stretch > 0.0 {
             let kind = Stretch((1.0 / settings.stretch) as f32);
-            project(kernel, kind, &mut local.lattice_stretch, &mut local.particles);
+            project(kernel, kind, &region.edges, &mut local.of_edges, &mut local.particles);
         }
-        if settings.volume > 0.0 {
-            let kind = Volume((1.0 / settings.volume - 1.0) as f32);
-            project(kernel, kind, &mut local.volume, &mut local.particles);
-            untangle(&local.volume, &mut local.particles, [0.1, 0.3], 8, 1);
+        let flesh = flesh(settings);
+        if flesh.volume_compliance.is_some() || flesh.energy_compliance.is_some() {
+            project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
         }
-        if settings.energy > 0.0 {
-            let kind = Energy((1.0 / settings.energy) as f32);
-            project(kernel, kind, &mut local.energy, &mut local.particles);
+        if settings.volume > 0.0 && untangles {
+            untangle(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
         }
     }
 
     fn project_surface(&mut self) {
         if self.settings.stretch > 0.0 {
-            let kind = Stretch((1.0 / self.settings.stretch) as f32);
-            project(self.kernel, kind, &mut self.local.surface_stretch, &mut self.local.particles);
+            let (kind, local) = (Stretch((1.0 / self.settings.stretch) as f32), &mut self.local);
+            project(self.kernel, kind, &local.region.sides, &mut local.of_sides, &mut local.particles);
         }
     }
 
-    /// Bind, planes and membranes of every joint.
-    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
+    /// Bind, planes and membranes of every joint. Returns the skin of the membranes.
+    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) -> Vec<u32> {
+        let mut membranes = Vec::new();
         for (k, active) in self.active.iter().enumerate() {
-            let members = std::mem::take(&mut self.local.free[k]);
+            let region = Arc::clone(&self.local.region);
+            let members = &region.free[k];
             if self.settings.bind > 0.0 && active.joint.is_limb {
-                bind_skin(&mut self.local, &axes[k], &members, self.settings.bind as f32);
+                bind_skin(&mut self.local, &axes[k], members, self.settings.bind as f32);
             }
-            if let Some(crease) = self.crease(k, &axes[k], share, &members) {
+            if let Some(crease) = self.crease(k, &axes[k], share, members) {
                 crease.separate(&mut self.local);
-                crease.relax(&mut self.local, &self.prepared.rest, passes);
+                membranes.extend(crease.relax(&mut self.local, &self.prepared.rest, passes));
             }
-            self.local.free[k] = members;
         }
+        membranes
     }
 
     /// Planes alone.
     fn separate(&mut self, axes: &[Axis], share: f32) {
         for k in 0..self.active.len() {
-            let members = std::mem::take(&mut self.local.free[k]);
-            if let Some(crease) = self.crease(k, &axes[k], share, &members) {
+            let region = Arc::clone(&self.local.region);
+            let members = &region.free[k];
+            if let Some(crease) = self.crease(k, &axes[k], share, members) {
                 crease.separate(&mut self.local);
             }
-            self.local.free[k] = members;
         }
     }
 
-    fn crease<'m>(
-        &self,
-        k: usize,
-        axis: &Axis,
-        share: f32,
-        members: &'m [super::joints::Member],
-    ) -> Option<Crease<'m>> {
+    fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
         if !self.settings.self_collision {
             return None;
         }
@@ -242,91 +229,148 @@ impl Frame<'_> {
     fn finish(&mut self, pose: &[DAffine3], quality: Quality) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
-        clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        let membranes = clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        let suspects = match quality {
+            Quality::Live => self.triangles_of(membranes),
+            Quality::Bake => (0..self.local.triangles.len() as u32).collect(),
+        };
         if self.settings.volume > 0.0 {
             clock.time("project", || {
-                untangle(&self.local.volume, &mut self.local.particles, [0.05, 0.3], 8, UNTANGLING);
+                let local = &mut self.local;
+                untangle(
+                    self.kernel,
+                    &local.region.tetrahedra,
+                    TETRAHEDRON,
+                    &mut local.particles,
+                    [0.05, 0.3],
+                    8,
+                    quality.untangling(),
+                );
             });
         }
-        let mut parted = clock.time("contact", || self.part());
-        for _ in 0..BALLOONS {
+        let (mut parted, mut left) = clock.time("contact", || self.part(&suspects));
+        for _ in 0..quality.balloons() {
             clock.time("balloon", || {
                 (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
             });
-            let more = clock.time("contact", || self.part());
+            let (more, pairs) = clock.time("contact", || self.part(&suspects));
+            left = pairs;
             if more.is_empty() {
                 break;
             }
             parted.extend(more);
         }
-        clock.time("balloon", || self.undo_harm(pose, &axes));
+        if self.prepared.surface.islands > 1 && self.settings.self_collision {
+            left = clock.time("contact", || self.pairs(&self.places()).len());
+        }
+        clock.time("contact", || self.undo_harm(pose, &axes, left));
         self.clock = clock;
     }
 
-    /// Gives a joint back to skinning where solving has cost it far more volume than skinning does: on very coarse skin
-    /// nothing is left of the inner side once it is pressed into the plane.
-    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis]) {
-        for k in 0..self.active.len() {
-            let (after, _) = self.measure(k, pose, &axes[k], &|p| place(&self.local.particles[p as usize]));
-            if after.abs() < HARM {
-                continue;
+    /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
+    /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
+        let all = 0..self.active.len();
+        let lost =
+            |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
+        let solved = self.places();
+        let suspects: Vec<usize> = all.clone().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
+        if suspects.is_empty() && left == 0 {
+            return;
+        }
+        let skins = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
+        let totals = skins.each_ref().map(|skin| self.pairs(skin).len());
+        let skin = &skins[usize::from(totals[1] < totals[0])];
+        for k in suspects {
+            if lost(self, k, &solved).abs() > lost(self, k, skin).abs() + HARM / 2.0 {
+                self.give_back(k, skin);
             }
-            let skin = skinned(self.prepared, &self.local, pose);
-            let (before, _) = self.measure(k, pose, &axes[k], &|p| skin[p as usize]);
-            if after.abs() < before.abs() + HARM / 2.0 {
-                continue;
+        }
+        let most = totals[0].min(totals[1]);
+        let mut left = self.pairs(&self.places());
+        for k in all.clone() {
+            if left.len() <= most {
+                return;
             }
-            for member in &self.local.free[k] {
-                let particle = &mut self.local.particles[member.particle as usize];
-                [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
+            let before = self.local.particles.clone();
+            self.give_back(k, skin);
+            let now = self.pairs(&self.places());
+            if now.len() < left.len() {
+                left = now;
+            } else {
+                self.local.particles = before;
             }
+        }
+        if left.len() > most {
+            all.for_each(|k| self.give_back(k, skin));
         }
     }
 
-    /// Takes out what folds are left in the region's skin; returns the particles that moved.
-    fn part(&mut self) -> Vec<u32> {
-        if !self.settings.self_collision {
-            return Vec::new();
+    fn places(&self) -> Vec<Vec3> {
+        self.local.particles.iter().map(place).collect()
+    }
+
+    /// The pairs of the region's triangles that pass through each other, but for those that do at rest.
+    fn pairs(&self, places: &[Vec3]) -> Vec<[u32; 2]> {
+        self.prepared.contact.all_pairs(&*self.local.region, places)
+    }
+
+    /// Puts a joint's skin where skinning has it.
+    fn give_back(&mut self, k: usize, skin: &[Vec3]) {
+        let Local { region, particles, .. } = &mut self.local;
+        for member in region.free[k].iter().chain(&region.beyond[k]) {
+            let particle = &mut particles[member.particle as usize];
+            [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
         }
-        let local = &self.local;
-        let skin = Skin {
-            triangles: &local.triangles,
-            names: &|t| local.triangle_names[t as usize],
-            ring: &|p| local.ring(p),
-            is_free: &|p| local.is_free(p),
-        };
-        let mut places: Vec<Vec3> = local.particles.iter().map(place).collect();
-        let moved = self.prepared.contact.part(&skin, &mut places);
+    }
+
+    /// The triangles that may fold: those of the membranes, and all of joints that have none.
+    fn triangles_of(&self, membranes: Vec<u32>) -> Vec<u32> {
+        let mut may_fold = vec![false; self.local.particles.len()];
+        let bare = self.active.iter().zip(&self.local.free).filter(|(active, _)| !active.joint.is_limb);
+        let particles = bare.flat_map(|(_, members)| members).map(|member| member.particle).chain(membranes);
+        particles.for_each(|p| may_fold[p as usize] = true);
+        let count = self.local.triangles.len() as u32;
+        (0..count).filter(|&t| self.local.triangles[t as usize].iter().any(|&p| may_fold[p as usize])).collect()
+    }
+
+    /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
+    fn part(&mut self, suspects: &[u32]) -> (Vec<u32>, usize) {
+        if !self.settings.self_collision {
+            return (Vec::new(), 0);
+        }
+        let mut places = self.places();
+        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
         }
-        moved
+        (moved, left)
     }
 
     fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
         if self.settings.volume == 0.0 {
             return;
         }
-        let members = std::mem::take(&mut self.local.free[k]);
+        let region = Arc::clone(&self.local.region);
+        let members = &region.free[k];
         let joint = self.active[k].joint;
-        let crease = self.crease(k, axis, 1.0, &members);
+        let crease = self.crease(k, axis, 1.0, members);
         let mut contacts =
             crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
         contacts.extend(parted);
         let kept = within(&self.local, &self.prepared.rest, &contacts, KEPT * joint.radius);
-        let balloon = Balloon::new(&self.local, &members, &kept);
+        let balloon = Balloon::new(&self.local, members, &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let most = if joint.is_limb { self.settings.bind as f32 } else { 0.0 };
         balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
             if most > 0.0 {
-                bind_skin(local, axis, &members, most);
+                bind_skin(local, axis, members, most);
             }
             if let Some(crease) = crease {
                 crease.separate(local);
             }
         });
-        self.local.free[k] = members;
     }
 
     fn rest_volume(&self, balloon: &Balloon, k: usize) -> f64 {
@@ -345,15 +389,11 @@ impl Frame<'_> {
         let before = skinned(self.prepared, &self.local, pose);
         let joints = (0..self.active.len()).map(|k| self.joint_report(k, path, pose, &axes[k], &before)).collect();
         let local = &self.local;
-        let constraints = [
-            local.lattice_stretch.len() + local.surface_stretch.len(),
-            local.volume.len(),
-            local.energy.len(),
-            local.free.iter().map(Vec::len).sum(),
-        ];
+        let constraints =
+            [local.edges.len() + local.sides.len(), local.tetrahedra.len() * 2, local.free.iter().map(Vec::len).sum()];
         Report {
             joints,
-            active_tetrahedra: local.volume.len(),
+            active_tetrahedra: local.tetrahedra.len(),
             inverted_tetrahedra: local.inverted(),
             constraints: constraints.iter().sum(),
             iterations: self.iterations,
@@ -366,7 +406,7 @@ impl Frame<'_> {
     }
 
     /// Volume of a joint's region against rest, and the farthest that its skin is from the bones against rest.
-    fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &dyn Fn(u32) -> Vec3) -> (f64, f64) {
+    fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &(dyn Fn(u32) -> Vec3 + Sync)) -> (f64, f64) {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
         let balloon = Balloon::new(&self.local, members, &[]);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);

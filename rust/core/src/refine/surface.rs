@@ -1,10 +1,16 @@
 //! The skin's surface for the solver: vertices at one place are one, with their neighbours and rest lengths.
 
-use std::collections::HashMap;
-
 use glam::{DVec3, Vec3};
 
+use super::morton::morton;
+use crate::adjacency::DisjointSets;
 use crate::mesh::TriMesh;
+use crate::weld::Weld;
+
+/// Vertices are one within this share of the bounding box' diagonal: what rounding makes of one place.
+const COINCIDENT: f64 = 1e-7;
+/// Steps of the Morton curve's grid along the bounding box' diagonal.
+const STEPS: f64 = (1 << 20) as f64;
 
 /// Welded vertices, their triangles and rings. Split seams of a mesh (UV, sharp edges) are closed by it.
 #[derive(Debug)]
@@ -15,8 +21,11 @@ pub(super) struct Surface {
     pub(super) of_vertex: Vec<u32>,
     /// A vertex of the mesh for each welded one.
     pub(super) source: Vec<u32>,
-    /// Triangles over welded vertices; those that name one twice are dropped.
+    /// Triangles over welded vertices, by their smallest one; those that name one twice are dropped.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The connected component of each welded vertex, and how many there are.
+    pub(super) island: Vec<u32>,
+    pub(super) islands: usize,
     /// Neighbours along edges, compressed by vertex, ascending.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -26,13 +35,18 @@ pub(super) struct Surface {
 
 impl Surface {
     pub(super) fn new(mesh: &TriMesh<'_>) -> Self {
-        let (of_vertex, source) = weld(mesh.positions());
+        let (of_vertex, source) = weld(mesh);
         let rest = source.iter().map(|&i| Vec3::from(mesh.positions()[i as usize]).as_dvec3()).collect();
         let welded = mesh.triangles().iter().map(|t| t.map(|i| of_vertex[i as usize]));
-        let triangles: Vec<_> = welded.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        let mut triangles: Vec<_> = welded.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        // Along the vertices' curve as well: boxes of neighbours are compared together.
+        triangles.sort_by_key(|t| t[0].min(t[1]).min(t[2]));
         let edges = edges_of(&triangles);
         let (starts, neighbours) = rings(&edges, source.len());
-        Self { rest, of_vertex, source, triangles, starts, neighbours, edges }
+        let mut sets = DisjointSets::new(source.len());
+        edges.iter().for_each(|&[i, j]| sets.union(i, j));
+        let (island, islands) = sets.number(|i| starts[i as usize] < starts[i as usize + 1]);
+        Self { rest, of_vertex, source, triangles, island, islands, starts, neighbours, edges }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -45,18 +59,24 @@ impl Surface {
     }
 }
 
-fn weld(positions: &[[f32; 3]]) -> (Vec<u32>, Vec<u32>) {
-    let mut first: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
-    let (mut of_vertex, mut source) = (Vec::with_capacity(positions.len()), Vec::new());
-    for (i, p) in positions.iter().enumerate() {
-        // Adding zero makes one of both zeros.
-        let welded = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
-            source.push(i as u32);
-            source.len() as u32 - 1
-        });
-        of_vertex.push(welded);
-    }
-    (of_vertex, source)
+/// Welded vertex of each vertex, and a vertex for each welded one; welded vertices are numbered along a Morton curve.
+fn weld(mesh: &TriMesh<'_>) -> (Vec<u32>, Vec<u32>) {
+    let positions = mesh.positions();
+    let all = || (0..positions.len() as u32).collect::<Vec<_>>();
+    let weld = Weld::coincident(positions, COINCIDENT * mesh.diagonal()).unwrap_or_else(|| Weld::new(&all()));
+    let first: Vec<u32> = weld.representatives().collect();
+    let low = positions.iter().fold(Vec3::INFINITY, |low, &p| low.min(p.into())).as_dvec3();
+    let scale = STEPS / mesh.diagonal().max(f64::MIN_POSITIVE);
+    let place = |class: u32| {
+        let steps = (Vec3::from(positions[first[class as usize] as usize]).as_dvec3() - low) * scale;
+        morton(steps.as_ivec3().to_array())
+    };
+    let mut order: Vec<u32> = (0..first.len() as u32).collect();
+    order.sort_by_cached_key(|&class| (place(class), class));
+    let mut number = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(n, &class)| number[class as usize] = n as u32);
+    let of_vertex = weld.class_of().iter().map(|&class| number[class as usize]).collect();
+    (of_vertex, order.iter().map(|&class| first[class as usize]).collect())
 }
 
 fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {

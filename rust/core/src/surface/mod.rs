@@ -37,6 +37,13 @@ pub struct SurfacePoint {
     pub distance: f64,
 }
 
+/// The answer of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Found {
+    point: SurfacePoint,
+    ties: u32,
+}
+
 /// A mesh prepared for closest-point queries (bounding volume hierarchy).
 ///
 /// Answers are exact and unique: the triangle with the smallest squared distance in f64 arithmetic, of equal ones the
@@ -65,8 +72,18 @@ impl SurfaceIndex {
     ///
     /// Queries must be finite; the distance to one that is not is NaN or infinite.
     pub fn closest_points(&self, queries: &[[f32; 3]]) -> Vec<SurfacePoint> {
+        self.found(queries, |found| found.point)
+    }
+
+    /// The same, and how many other triangles are as near, but for rounding errors; those that share the closest point are
+    /// among them.
+    pub fn closest_points_and_ties(&self, queries: &[[f32; 3]]) -> Vec<(SurfacePoint, u32)> {
+        self.found(queries, |found| (found.point, found.ties))
+    }
+
+    fn found<T: Send>(&self, queries: &[[f32; 3]], take: impl Fn(Found) -> T + Sync) -> Vec<T> {
         let order = morton::order(queries);
-        let mut along_curve = vec![SurfacePoint::default(); queries.len()];
+        let mut along_curve = vec![Found::default(); queries.len()];
         let batches = order.par_chunks(BATCH).zip(along_curve.par_chunks_mut(BATCH));
         batches.for_each(|(order, answers)| {
             let queries: Vec<_> = order.iter().map(|&i| queries[i as usize]).collect();
@@ -74,14 +91,14 @@ impl SurfaceIndex {
         });
         let mut place = vec![0; queries.len()];
         order.iter().zip(0u32..).for_each(|(&i, along)| place[i as usize] = along);
-        place.into_par_iter().with_min_len(BATCH).map(|along| along_curve[along as usize]).collect()
+        place.into_par_iter().with_min_len(BATCH).map(|along| take(along_curve[along as usize])).collect()
     }
 
     /// Exact closest point for one query, world space.
     pub fn closest_point(&self, query: [f32; 3]) -> SurfacePoint {
-        let mut answer = [SurfacePoint::default()];
+        let mut answer = [Found::default()];
         self.answer(&[query], &mut answer);
-        answer[0]
+        answer[0].point
     }
 
     /// The cheapest points for each query (Q, 3) of a `cost` that is at least the squared distance, and those that are
@@ -112,7 +129,7 @@ impl SurfaceIndex {
         answers.into_iter().map(|answer| answer.expect("each query is on the curve once")).collect()
     }
 
-    fn answer(&self, queries: &[[f32; 3]], answers: &mut [SurfacePoint]) {
+    fn answer(&self, queries: &[[f32; 3]], answers: &mut [Found]) {
         Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
     }
 }

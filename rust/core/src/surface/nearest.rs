@@ -13,9 +13,14 @@ use super::lanes::LANES;
 /// Queries looked at together: a register of f64.
 const GROUP: usize = 4;
 
+/// Triangles whose squared distances differ by less than this share are equally near.
+const TIE: f64 = 1e-9;
+
 /// The nearest triangle of each query so far.
 pub(super) struct Nearest {
     squared: [f64; LANES],
+    /// How many others are equally near, by their distances when they were looked at.
+    ties: [u64; LANES],
     barycentric: [[f64; LANES]; 3],
     triangle: [u64; LANES],
     place: [u64; LANES],
@@ -27,6 +32,7 @@ impl Nearest {
     pub(super) fn new(bvh: &Bvh) -> Self {
         Self {
             squared: [f64::INFINITY; LANES],
+            ties: [0; LANES],
             barycentric: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
             triangle: [bvh.triangles[0].into(); LANES],
             place: [0; LANES],
@@ -49,6 +55,8 @@ impl Nearest {
                     closest_to_origin([corners[0] - query, corners[1] - query, corners[2] - query]);
                 let best = self.squared[lane];
                 let nearer = (squared < best) | ((squared == best) & (triangle < self.triangle[lane]));
+                let ties = self.ties[lane] + u64::from(squared <= best * (1.0 + TIE));
+                self.ties[lane] = if squared < best * (1.0 - TIE) { 0 } else { ties };
                 self.squared[lane] = if nearer { squared } else { best };
                 for k in 0..3 {
                     self.barycentric[k][lane] = if nearer { barycentric[k] } else { self.barycentric[k][lane] };
@@ -66,6 +74,12 @@ impl Nearest {
             barycentric: [self.barycentric[0][lane], self.barycentric[1][lane], self.barycentric[2][lane]],
             distance: self.squared[lane].sqrt(),
         }
+    }
+
+    /// How many other triangles are as near; where some come within rounding errors of that, they may be counted too.
+    #[inline(always)]
+    pub(super) fn ties(&self, lane: usize) -> u32 {
+        self.ties[lane] as u32
     }
 
     /// Place of the nearest triangle.

@@ -5,7 +5,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::SurfacePoint;
+use super::Found;
 use super::bvh::Bvh;
 use super::lanes::{LANES, Lanes, Register};
 use super::nearest::Nearest;
@@ -20,7 +20,7 @@ const MANY: usize = 1024;
 pub(super) struct Batch<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) queries: &'a [[f32; 3]],
-    pub(super) answers: &'a mut [SurfacePoint],
+    pub(super) answers: &'a mut [Found],
 }
 
 impl WithSimd for Batch<'_> {
@@ -33,7 +33,7 @@ impl WithSimd for Batch<'_> {
         for (queries, answers) in self.queries.chunks(LANES).zip(self.answers.chunks_mut(LANES)) {
             let nearest = search.nearest(queries, start);
             for (lane, answer) in answers.iter_mut().enumerate() {
-                *answer = nearest.surface_point(lane);
+                *answer = Found { point: nearest.surface_point(lane), ties: nearest.ties(lane) };
             }
             start = nearest.place(queries.len() - 1) / WIDTH as u32;
         }
@@ -197,7 +197,7 @@ mod tests {
         let bvh = Bvh::new(&triangles, |t| [point(t), point(t) + 0.1 * point(t + 7), point(t) + 0.2 * point(t + 9)]);
         let queries: Vec<_> = (0..500).map(|i| (1.5 * point(31 * i)).to_array()).collect();
         for count in [500, 1, 15, 17] {
-            let mut answers = [vec![SurfacePoint::default(); count], vec![SurfacePoint::default(); count]];
+            let mut answers = [vec![Found::default(); count], vec![Found::default(); count]];
             let [widest, scalar] = &mut answers;
             pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries[..count], answers: widest });
             Batch { bvh: &bvh, queries: &queries[..count], answers: scalar }.with_simd(pulp::Scalar::new());

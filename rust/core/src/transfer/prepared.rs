@@ -142,7 +142,7 @@ impl Inpainting {
         settings.check()?;
         let is_another = self.target.weld_again(settings.weld_tolerance)?;
         let criteria = Criteria::new(settings, &self.source, &self.target);
-        if is_another || self.matches.method() != settings.method {
+        if is_another || self.matches.differ(settings.method, settings.average_ties) {
             self.matches = Matches::find(settings.method, &self.source, self.target.surface(), &criteria);
         } else {
             self.matches.refresh(&self.source, self.target.surface(), &criteria);

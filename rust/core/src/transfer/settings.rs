@@ -43,6 +43,9 @@ pub struct Settings {
     pub max_normal_angle: f64,
     /// Whether opposite normals match too. Default true.
     pub match_flipped_normals: bool,
+    /// Whether a vertex that is equally near to several places takes the mean of those whose normals agree best, as
+    /// symmetry asks for in the middle of a body, instead of the first triangle's row. Default false.
+    pub average_ties: bool,
     /// l of the energy S + l^2 S M^-1 S; relative to the source's diagonal. 0 gives the harmonic solution. Default
     /// 0.05 relative.
     pub smoothness_length: Length,
@@ -67,6 +70,7 @@ impl Default for Settings {
             weld_tolerance: Length::Relative(1e-6),
             max_normal_angle: 35f64.to_radians(),
             match_flipped_normals: true,
+            average_ties: false,
             smoothness_length: Length::Relative(0.05),
             smoothing_iterations: 0,
             smoothing_factor: 0.2,

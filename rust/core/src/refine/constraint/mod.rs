@@ -40,7 +40,7 @@ impl<T: Number, const N: usize> Constraint<T, N> {
     /// One step of XPBD for points of inverse mass `w`, with compliance `alpha` and the multiplier so far.
     #[inline(always)]
     pub fn project(&self, w: [T; N], alpha: T, multiplier: T) -> Projection<T, N> {
-        let mut sum = alpha + T::constant(1e-20);
+        let mut sum = alpha + alpha.constant(1e-20);
         for k in 0..N {
             sum = sum + w[k] * dot(self.gradient[k], self.gradient[k]);
         }

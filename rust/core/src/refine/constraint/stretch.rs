@@ -8,6 +8,6 @@ use crate::refine::number::{Number, Vector, dot, scaled, sub};
 pub fn stretch<T: Number>([a, b]: [Vector<T>; 2], length: T) -> Constraint<T, 2> {
     let between = sub(a, b);
     let now = dot(between, between).sqrt();
-    let direction = scaled(between, T::constant(1.0) / (now + T::constant(1e-12)));
-    Constraint { value: now - length, gradient: [direction, scaled(direction, T::constant(-1.0))] }
+    let direction = scaled(between, length.constant(1.0) / (now + length.constant(1e-12)));
+    Constraint { value: now - length, gradient: [direction, scaled(direction, length.constant(-1.0))] }
 }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use self::clones::{Element, joined_corners, pieces};
 use self::raster::{Crossing, crossings};
 use self::tetrahedron::{Point, Tetrahedron, place};
+use super::morton::morton;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -155,11 +156,6 @@ fn number(elements: &[Element], sets: &mut crate::adjacency::DisjointSets) -> (V
         }
     }
     (points, tetrahedra)
-}
-
-fn morton(point: Point) -> u64 {
-    let spread = |x: i32| (0..21).fold(0u64, |bits, b| bits | u64::from((x.max(0) as u32 >> b) & 1) << (3 * b));
-    spread(point[0]) | spread(point[1]) << 1 | spread(point[2]) << 2
 }
 
 fn edges(tetrahedra: &[[u32; 4]]) -> Vec<[u32; 2]> {

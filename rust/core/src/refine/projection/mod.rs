@@ -1,210 +1,231 @@
-//! Projecting all constraints of a kind, batch by batch: eight side by side, compiled for AVX-512, AVX2 and plain code and
-//! chosen at run time. The same bits everywhere, because the same operations are rounded in the same order.
+//! Projecting all constraints of a kind: blocks of particles side by side on all threads, then what lies between them;
+//! within a block colour by colour, eight constraints side by side, compiled for AVX2 and plain code and chosen at run
+//! time. The same bits everywhere, because the same operations are rounded in the same order.
 
 // Indices are constants after unrolling; iterators over them are not inlined across instruction sets.
 #![allow(clippy::needless_range_loop)]
 
 mod batch;
+mod blocks;
 mod colouring;
+mod kind;
+mod register;
+mod untangle;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
-use pulp::{Arch, Simd, WithSimd};
-
-pub use self::batch::{Batch, Particle};
+pub use self::batch::{Batch, Multipliers, Particle};
+pub use self::blocks::Blocks;
 pub use self::colouring::Colouring;
-use super::constraint::{Constraint, energy, stretch, volume};
-use super::number::{LANES, Lanes, Number, Vector, add};
-use batch::{gather, scatter};
-
-/// A kind of constraint: how its value comes from particles and rest numbers, and its compliance.
-pub trait Kind<const N: usize, const M: usize>: Copy {
-    /// Value and gradients.
-    fn constraint<T: Number>(self, places: [Vector<T>; N], rest: [T; M]) -> Constraint<T, N>;
-    /// Compliance of a constraint with these rest numbers.
-    fn compliance<T: Number>(self, rest: [T; M]) -> T;
-}
-
-/// Edges keep their lengths. The number is the compliance.
-#[derive(Debug, Clone, Copy)]
-pub struct Stretch(pub f32);
-
-/// Tetrahedra keep their volumes; rest numbers: volume, and its power 4/3. The number is the compliance relative to that.
-#[derive(Debug, Clone, Copy)]
-pub struct Volume(pub f32);
-
-/// Corners keep their distances to the centre. The number is the compliance.
-#[derive(Debug, Clone, Copy)]
-pub struct Energy(pub f32);
-
-impl Kind<2, 1> for Stretch {
-    #[inline(always)]
-    fn constraint<T: Number>(self, places: [Vector<T>; 2], rest: [T; 1]) -> Constraint<T, 2> {
-        stretch(places, rest[0])
-    }
-
-    #[inline(always)]
-    fn compliance<T: Number>(self, _rest: [T; 1]) -> T {
-        T::constant(self.0)
-    }
-}
-
-impl Kind<4, 2> for Volume {
-    #[inline(always)]
-    fn constraint<T: Number>(self, places: [Vector<T>; 4], rest: [T; 2]) -> Constraint<T, 4> {
-        volume(places, rest[0])
-    }
-
-    #[inline(always)]
-    fn compliance<T: Number>(self, rest: [T; 2]) -> T {
-        T::constant(self.0) * rest[1]
-    }
-}
-
-impl Kind<4, 4> for Energy {
-    #[inline(always)]
-    fn constraint<T: Number>(self, places: [Vector<T>; 4], rest: [T; 4]) -> Constraint<T, 4> {
-        energy(places, rest)
-    }
-
-    #[inline(always)]
-    fn compliance<T: Number>(self, _rest: [T; 4]) -> T {
-        T::constant(self.0)
-    }
-}
+pub use self::kind::{Flesh, Kind, Stretch};
+use self::register::Register;
+pub use self::untangle::untangle;
+use super::number::{LANES, Lanes};
 
 /// How constraints are gone through. The answer is the same, to the bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kernel {
     /// Eight side by side.
     Lanes,
-    /// One after the other.
+    /// One after the other, on one thread.
     Scalar,
 }
 
+/// Constraints that are worth a second thread.
+const WORTH_A_THREAD: usize = 512;
+
 /// Projects every constraint of `batch` once.
-pub fn project<K: Kind<N, M>, const N: usize, const M: usize>(
+pub fn project<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize>(
     kernel: Kernel,
     kind: K,
-    batch: &mut Batch<N, M>,
+    batch: &Batch<N, M>,
+    multipliers: &mut Multipliers<L>,
     particles: &mut [Particle],
 ) {
-    match kernel {
-        Kernel::Lanes => Arch::new().dispatch(Sweep { kind, batch, particles }),
-        Kernel::Scalar => one_by_one(kind, batch, particles, 0, batch.len()),
+    if batch.is_empty() {
+        return;
     }
+    let (before, own) = (batch.blocks.cut(0), batch.blocks.cut(batch.blocks.leaves()));
+    let multipliers = multipliers.0.each_mut().map(Vec::as_mut_slice);
+    let part = Part { kernel, kind, batch, multipliers, particles: &mut particles[before..own], base: before };
+    part.project(1);
 }
 
-/// Projects the constraints of tetrahedra that have less than `least` of their volume towards `target` of it, one by one,
-/// `passes` times over those that stay so thin; then looks for others, `rounds` times in all.
-///
-/// The sweeps converge slowly where a bend turns tetrahedra inside out; there are few of them.
-pub fn untangle(
-    batch: &Batch<4, 2>,
-    particles: &mut [Particle],
-    [least, target]: [f32; 2],
-    passes: usize,
-    rounds: usize,
-) {
-    let corners = |k: usize| [0, 1, 2, 3].map(|n| batch.particles[n][k] as usize);
-    let value = |particles: &[Particle], k: usize, share: f32| {
-        let places = corners(k).map(|p| [particles[p][0], particles[p][1], particles[p][2]]);
-        volume(places, share * batch.rest[0][k])
-    };
-    for _ in 0..rounds {
-        let mut left: Vec<usize> = (0..batch.len()).filter(|&k| value(particles, k, least).value < 0.0).collect();
-        if left.is_empty() {
-            return;
-        }
-        for _ in 0..passes {
-            for &k in &left {
-                let at = corners(k);
-                let step = value(particles, k, target).project(at.map(|p| particles[p][3]), 0.0, 0.0);
-                for (p, by) in at.into_iter().zip(step.moves) {
-                    (0..3).for_each(|c| particles[p][c] += by[c]);
-                }
-            }
-            left.retain(|&k| value(particles, k, least).value < 0.0);
-        }
-    }
-}
-
-struct Sweep<'a, K, const N: usize, const M: usize> {
+/// A block's share of everything: its constraints' multipliers, and its particles, of which the first has number `base`.
+struct Part<'a, K, const N: usize, const M: usize, const L: usize> {
+    kernel: Kernel,
     kind: K,
-    batch: &'a mut Batch<N, M>,
+    batch: &'a Batch<N, M>,
+    multipliers: [&'a mut [f32]; L],
     particles: &'a mut [Particle],
+    base: usize,
 }
 
-impl<K: Kind<N, M>, const N: usize, const M: usize> WithSimd for Sweep<'_, K, N, M> {
+impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Part<'_, K, N, M, L> {
+    /// Both halves, then what lies between them.
+    fn project(mut self, block: usize) {
+        if block < self.batch.blocks.leaves() {
+            self.halves(block);
+        }
+        let first = self.batch.first_of(block);
+        self.sweep(block, first);
+    }
+
+    fn halves(&mut self, block: usize) {
+        let batch = self.batch;
+        let first = batch.first_of(block);
+        let [middle, end] = [2 * block, 2 * block + 1].map(|half| batch.spans[half].to - first);
+        let mut right: [&mut [f32]; L] = std::array::from_fn(|_| Default::default());
+        let mut left: [&mut [f32]; L] = std::array::from_fn(|_| Default::default());
+        for (l, column) in self.multipliers.iter_mut().enumerate() {
+            (left[l], right[l]) = column[..end].split_at_mut(middle);
+        }
+        let cut = batch.blocks.cut(first_leaf(2 * block + 1, batch.blocks.leaves()));
+        let (low, high) = self.particles.split_at_mut(cut - self.base);
+        let (kernel, kind) = (self.kernel, self.kind);
+        let left = Part { kernel, kind, batch, multipliers: left, particles: low, base: self.base };
+        let right = Part { kernel, kind, batch, multipliers: right, particles: high, base: cut };
+        let side_by_side = kernel == Kernel::Lanes && middle.min(end - middle) >= WORTH_A_THREAD;
+        if side_by_side {
+            rayon::join(|| left.project(2 * block), || right.project(2 * block + 1));
+        } else {
+            left.project(2 * block);
+            right.project(2 * block + 1);
+        }
+    }
+
+    /// The constraints of the block that are in none of its halves; the block's multipliers begin with constraint `first`.
+    fn sweep(self, block: usize, first: usize) {
+        let sweep = Sweep { block, first, part: self };
+        match sweep.part.kernel {
+            Kernel::Scalar => sweep.one_by_one(),
+            Kernel::Lanes => sweep.side_by_side(),
+        }
+    }
+}
+
+fn first_leaf(mut block: usize, leaves: usize) -> usize {
+    while block < leaves {
+        block *= 2;
+    }
+    block - leaves
+}
+
+struct Sweep<'a, K, const N: usize, const M: usize, const L: usize> {
+    block: usize,
+    first: usize,
+    part: Part<'a, K, N, M, L>,
+}
+
+impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_, K, N, M, L> {
+    fn side_by_side(self) {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return pulp::Simd::vectorize(simd, WithWide { simd, sweep: self });
+        }
+        self.eights::<Lanes>(());
+    }
+
+    #[inline(always)]
+    fn eights<R: Register>(self, proof: R::Proof) {
+        let Self { block, first, part: Part { kind, batch, multipliers, particles, base, .. } } = self;
+        let span = batch.spans[block];
+        let mut from = span.from;
+        for run in span.runs.0..span.runs.1 {
+            let end = batch.ends[run] as usize;
+            while from < end {
+                let count = LANES.min(end - from);
+                let mut at = [[0u32; LANES]; N];
+                let (mut places, mut w) = ([[R::load(proof, &[0.0; LANES]); 3]; N], [R::load(proof, &[0.0; LANES]); N]);
+                for n in 0..N {
+                    at[n] = indices(&batch.particles[n], from, count, base as u32);
+                    (places[n], w[n]) = R::gather(proof, particles, &at[n]);
+                }
+                let mut rest = [R::load(proof, &[0.0; LANES]); M];
+                for m in 0..M {
+                    rest[m] = R::load(proof, &eight(&batch.rest[m], from, count));
+                }
+                let mut own = [R::load(proof, &[0.0; LANES]); L];
+                for l in 0..L {
+                    own[l] = R::load(proof, &eight(multipliers[l], from - first, count));
+                }
+                kind.project(&mut places, w, rest, &mut own);
+                for n in 0..N {
+                    R::scatter(places[n], w[n], particles, &at[n], count);
+                }
+                for l in 0..L {
+                    let mut column = [0.0; LANES];
+                    own[l].store(&mut column);
+                    multipliers[l][from - first..from - first + count].copy_from_slice(&column[..count]);
+                }
+                from += count;
+            }
+        }
+    }
+
+    fn one_by_one(self) {
+        let Self { block, first, part: Part { kind, batch, multipliers, particles, base, .. } } = self;
+        let span = batch.spans[block];
+        for k in span.from..span.to {
+            let (mut places, mut w) = ([[0.0; 3]; N], [0.0; N]);
+            for n in 0..N {
+                let [x, y, z, mass] = particles[batch.particles[n][k] as usize - base];
+                (places[n], w[n]) = ([x, y, z], mass);
+            }
+            let rest: [f32; M] = std::array::from_fn(|m| batch.rest[m][k]);
+            let mut own: [f32; L] = std::array::from_fn(|l| multipliers[l][k - first]);
+            kind.project(&mut places, w, rest, &mut own);
+            for n in 0..N {
+                let [x, y, z] = places[n];
+                particles[batch.particles[n][k] as usize - base] = [x, y, z, w[n]];
+            }
+            (0..L).for_each(|l| multipliers[l][k - first] = own[l]);
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+struct WithWide<'a, K, const N: usize, const M: usize, const L: usize> {
+    simd: pulp::x86::V3,
+    sweep: Sweep<'a, K, N, M, L>,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> pulp::WithSimd for WithWide<'_, K, N, M, L> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        let Self { kind, batch, particles } = self;
-        let mut from = 0;
-        for b in 0..batch.ends.len() {
-            let end = batch.ends[b] as usize;
-            while from + LANES <= end {
-                side_by_side(kind, batch, particles, from);
-                from += LANES;
-            }
-            one_by_one(kind, batch, particles, from, end);
-            from = end;
-        }
-        one_by_one(kind, batch, particles, from, batch.len());
+    fn with_simd<S: pulp::Simd>(self, _simd: S) {
+        self.sweep.eights::<wide::Wide>(self.simd);
     }
 }
 
+/// Eight numbers from `from` on; where a run ends before them, its last one again.
 #[inline(always)]
-fn side_by_side<K: Kind<N, M>, const N: usize, const M: usize>(
-    kind: K,
-    batch: &mut Batch<N, M>,
-    particles: &mut [Particle],
-    from: usize,
-) {
-    let (mut places, mut w) = ([[Lanes([0.0; LANES]); 3]; N], [Lanes([0.0; LANES]); N]);
-    for n in 0..N {
-        (places[n], w[n]) = gather(particles, eight(&batch.particles[n], from));
+fn eight(column: &[f32], from: usize, count: usize) -> [f32; LANES] {
+    if count == LANES {
+        return *column[from..].first_chunk().expect("eight more");
     }
-    let mut rest = [Lanes([0.0; LANES]); M];
-    for m in 0..M {
-        rest[m] = Lanes(*eight(&batch.rest[m], from));
+    let mut some = [column[from]; LANES];
+    for lane in 0..count {
+        some[lane] = column[from + lane];
     }
-    let multiplier = Lanes(*eight(&batch.multipliers, from));
-    let step = kind.constraint(places, rest).project(w, kind.compliance(rest), multiplier);
-    for n in 0..N {
-        scatter(particles, eight(&batch.particles[n], from), add(places[n], step.moves[n]), w[n]);
-    }
-    let sum = multiplier + step.multiplier;
-    batch.multipliers[from..from + LANES].copy_from_slice(&sum.0);
+    some
 }
 
+/// The same of particles, counted from `base`.
 #[inline(always)]
-fn eight<T>(column: &[T], from: usize) -> &[T; LANES] {
-    column[from..].first_chunk().expect("a batch holds eight more")
-}
-
-#[inline(always)]
-fn one_by_one<K: Kind<N, M>, const N: usize, const M: usize>(
-    kind: K,
-    batch: &mut Batch<N, M>,
-    particles: &mut [Particle],
-    from: usize,
-    end: usize,
-) {
-    for k in from..end {
-        let (mut places, mut w) = ([[0.0; 3]; N], [0.0; N]);
-        for n in 0..N {
-            let [x, y, z, mass] = particles[batch.particles[n][k] as usize];
-            (places[n], w[n]) = ([x, y, z], mass);
+fn indices(column: &[u32], from: usize, count: usize, base: u32) -> [u32; LANES] {
+    let mut some = [column[from] - base; LANES];
+    if count == LANES {
+        let column: &[u32; LANES] = column[from..].first_chunk().expect("eight more");
+        for lane in 0..LANES {
+            some[lane] = column[lane] - base;
         }
-        let mut rest = [0.0; M];
-        for m in 0..M {
-            rest[m] = batch.rest[m][k];
+    } else {
+        for lane in 0..count {
+            some[lane] = column[from + lane] - base;
         }
-        let step = kind.constraint(places, rest).project(w, kind.compliance(rest), batch.multipliers[k]);
-        for n in 0..N {
-            let [x, y, z] = add(places[n], step.moves[n]);
-            particles[batch.particles[n][k] as usize] = [x, y, z, w[n]];
-        }
-        batch.multipliers[k] += step.multiplier;
     }
+    some
 }

@@ -1,5 +1,7 @@
 //! One or several points of the source per target vertex.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -15,6 +17,8 @@ pub struct Candidates {
     first: Vec<SurfacePoint>,
     /// All points of the vertices that have several; none if no vertex has.
     several: Several,
+    /// Vertices whose first point is the only one, whatever they had before.
+    replaced: BTreeSet<u32>,
 }
 
 #[derive(Debug, Default)]
@@ -37,7 +41,7 @@ impl Several {
 impl Candidates {
     /// One point for each vertex, (V).
     pub fn one_each(points: Vec<SurfacePoint>) -> Self {
-        Self { first: points, several: Several::default() }
+        Self { first: points, several: Several::default(), replaced: BTreeSet::new() }
     }
 
     /// The `first` point of each vertex (V), and for those that have more than one, all of them with their shares (V lists,
@@ -48,7 +52,7 @@ impl Candidates {
             several.points.extend(points);
             several.starts.push(several.points.len() as u32);
         }
-        Self { first, several }
+        Self { first, several, replaced: BTreeSet::new() }
     }
 
     /// The first point of each vertex, (V).
@@ -56,14 +60,26 @@ impl Candidates {
         &self.first
     }
 
-    /// Puts another point in the place of the first one of vertex `i`.
-    pub(super) fn set_first(&mut self, i: usize, point: SurfacePoint) {
-        self.first[i] = point;
+    /// Lets another point stand for all that vertex `i` has; the one that stood first.
+    pub(super) fn replace(&mut self, i: u32, point: SurfacePoint) -> SurfacePoint {
+        self.replaced.insert(i);
+        std::mem::replace(&mut self.first[i as usize], point)
+    }
+
+    /// Undoes [`Candidates::replace`].
+    pub(super) fn restore(&mut self, i: u32, first: SurfacePoint) {
+        self.replaced.remove(&i);
+        self.first[i as usize] = first;
+    }
+
+    /// All points of vertex `i`, empty if its first one is all it has.
+    fn several_of(&self, i: usize) -> &[(SurfacePoint, f64)] {
+        if self.replaced.contains(&(i as u32)) { &[] } else { self.several.of(i) }
     }
 
     /// Whether the source has any weight at the points of each vertex, (V).
     pub(super) fn weighted(&self, source: &Source) -> Vec<bool> {
-        let has_weight = |i| match self.several.of(i) {
+        let has_weight = |i| match self.several_of(i) {
             [] => source.is_weighted(&self.first[i]),
             points => points.iter().any(|(point, _)| source.is_weighted(point)),
         };
@@ -72,7 +88,7 @@ impl Candidates {
 
     /// Mean of the points of vertex `i`, world space.
     pub(super) fn mean_position(&self, source: &Source, i: usize) -> DVec3 {
-        match self.several.of(i) {
+        match self.several_of(i) {
             [] => source.position(&self.first[i]),
             points => points.iter().map(|(point, share)| source.position(point) * *share).sum(),
         }
@@ -80,7 +96,7 @@ impl Candidates {
 
     /// Appends the mean of the source's rows at the points of vertex `i`, normalised, in bone order.
     pub(super) fn append_row(&self, source: &Source, i: usize, row: &mut Row) {
-        let points = self.several.of(i);
+        let points = self.several_of(i);
         if points.is_empty() {
             return source.blend(&self.first[i], row);
         }

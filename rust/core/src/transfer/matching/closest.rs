@@ -4,9 +4,8 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::{MaskValue, Matches, TargetSurface};
+use super::{Candidates, MaskValue, Matches, TargetSurface, ties};
 use crate::fill::Constraint;
-use crate::surface::SurfacePoint;
 use crate::transfer::target::Target;
 use crate::transfer::{Length, Settings, Source};
 
@@ -23,6 +22,8 @@ pub struct Criteria {
     pub max_normal_angle: f64,
     /// Whether a normal that points the opposite way matches too (inner layers, linings).
     pub match_flipped_normals: bool,
+    /// Whether a vertex that is equally near to several places takes the mean of those whose normals agree best.
+    pub average_ties: bool,
 }
 
 impl Criteria {
@@ -34,6 +35,7 @@ impl Criteria {
             },
             max_normal_angle: settings.max_normal_angle,
             match_flipped_normals: settings.match_flipped_normals,
+            average_ties: settings.average_ties,
         }
     }
 
@@ -59,9 +61,13 @@ impl Criteria {
     }
 }
 
-/// The closest point of each vertex.
-pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> Vec<SurfacePoint> {
-    source.index().closest_points(target.positions)
+/// The closest point of each vertex, several where they tie and that is asked for.
+pub(super) fn find(source: &Source, target: TargetSurface<'_>, average_ties: bool) -> Candidates {
+    if average_ties {
+        ties::find(source, target)
+    } else {
+        Candidates::one_each(source.index().closest_points(target.positions))
+    }
 }
 
 /// Matched vertices are fixed, the others free.

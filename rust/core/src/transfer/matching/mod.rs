@@ -7,6 +7,7 @@
 mod candidates;
 mod closest;
 mod confidence;
+mod ties;
 mod upright;
 
 use glam::{DVec3, Vec3};
@@ -106,7 +107,7 @@ impl Matches {
     /// Finds the points of all vertices of `target` on `source`.
     pub fn find(method: MatchMethod, source: &Source, target: TargetSurface<'_>, criteria: &Criteria) -> Self {
         let (candidates, trust) = match method {
-            MatchMethod::ClosestPoint => (Candidates::one_each(closest::find(source, target)), Default::default()),
+            MatchMethod::ClosestPoint => (closest::find(source, target, criteria.average_ties), Default::default()),
             MatchMethod::Confidence => confidence::find(source, target),
         };
         let points = candidates.first_points().par_iter().with_min_len(1024).enumerate();
@@ -124,7 +125,7 @@ impl Matches {
         if self.criteria != *criteria {
             self.criteria = *criteria;
             for (i, point, angle) in std::mem::take(&mut self.moved) {
-                self.candidates.set_first(i as usize, point);
+                self.candidates.restore(i, point);
                 self.angles[i as usize] = angle;
             }
             self.move_flipped(source, target);
@@ -143,8 +144,7 @@ impl Matches {
         };
         for (i, point) in found {
             let k = i as usize;
-            self.moved.push((i, self.candidates.first_points()[k], self.angles[k]));
-            self.candidates.set_first(k, point);
+            self.moved.push((i, self.candidates.replace(i, point), self.angles[k]));
             self.angles[k] = target.angle(source, k, &point);
             self.weighted[k] = source.is_weighted(&point);
         }
@@ -178,6 +178,11 @@ impl Matches {
     /// Distance to them, and the cosine between the normals; only [`MatchMethod::Confidence`] keeps them.
     pub(super) fn gap_and_cosine(&self, i: usize) -> (f64, f64) {
         (self.trust.gap[i], self.trust.cosine[i])
+    }
+
+    /// Whether points would be found otherwise by this method and with this choice for ties.
+    pub(super) fn differ(&self, method: MatchMethod, average_ties: bool) -> bool {
+        self.method != method || self.criteria.average_ties != average_ties
     }
 
     /// The method that found them.

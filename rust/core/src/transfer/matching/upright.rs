@@ -71,20 +71,22 @@ impl Side {
     }
 }
 
-/// For each vertex `found`, whether more of those around its patch match upright than flipped.
+/// For each vertex `found`, whether more of the vertices around its patch match upright than flipped.
 fn patches_among_upright(target: TargetSurface<'_>, found: &[(u32, SurfacePoint)], mut sides: Vec<Side>) -> Vec<bool> {
     found.iter().for_each(|&(i, _)| sides[i as usize] = Side::Open);
     let side = |i: u32| sides[i as usize];
-    let touching = || target.triangles.iter().filter(|t| t.iter().any(|&i| side(i) == Side::Open));
+    // Where limbs penetrate deeply, vertices that match neither way lie around the patch.
+    let is_open = |i: u32| matches!(side(i), Side::Open | Side::Neither);
+    let touching = || target.triangles.iter().filter(|t| t.iter().any(|&i| is_open(i)));
     let mut patches = DisjointSets::new(sides.len());
     for t in touching() {
-        let mut open = t.iter().filter(|&&i| side(i) == Side::Open);
+        let mut open = t.iter().filter(|&&i| is_open(i));
         let first = *open.next().expect("this triangle touches one");
         open.for_each(|&i| patches.union(first, i));
     }
     let mut votes = vec![0i64; sides.len()];
     for t in touching() {
-        let open = *t.iter().find(|&&i| side(i) == Side::Open).expect("this triangle touches one");
+        let open = *t.iter().find(|&&i| is_open(i)).expect("this triangle touches one");
         votes[patches.find(open) as usize] += t.iter().map(|&i| i64::from(side(i) == Side::Upright)).sum::<i64>();
         votes[patches.find(open) as usize] -= t.iter().map(|&i| i64::from(side(i) == Side::Flipped)).sum::<i64>();
     }

@@ -1,0 +1,81 @@
+//! What is projected together: the numbers of a kind of constraint, and what it does to its particles.
+
+#![allow(clippy::needless_range_loop)]
+
+use super::super::constraint::{Constraint, energy, stretch, volume};
+use super::super::number::{Number, Vector, add};
+
+/// Constraints over `N` particles with `M` numbers at rest and `L` multipliers.
+pub trait Kind<const N: usize, const M: usize, const L: usize>: Copy + Send + Sync {
+    /// Moves `places` of inverse masses `w`.
+    fn project<T: Number>(self, places: &mut [Vector<T>; N], w: [T; N], rest: [T; M], multipliers: &mut [T; L]);
+}
+
+/// Edges keep their lengths. The number is the compliance.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch(pub f32);
+
+impl Kind<2, 1, 1> for Stretch {
+    #[inline(always)]
+    fn project<T: Number>(self, places: &mut [Vector<T>; 2], w: [T; 2], [length]: [T; 1], multipliers: &mut [T; 1]) {
+        apply(stretch(*places, length), places, w, length.constant(self.0), &mut multipliers[0]);
+    }
+}
+
+/// Tetrahedra, all alike at rest, keep their volume and their corners' distances to the centre: two constraints on the
+/// same particles, one after the other without a way through memory.
+#[derive(Debug, Clone, Copy)]
+pub struct Flesh {
+    /// Volume at rest.
+    pub volume: f32,
+    /// Distance of the corners to the centre at rest.
+    pub arm: f32,
+    /// Compliance of the volume, if it is kept.
+    pub volume_compliance: Option<f32>,
+    /// Compliance of the distances, if they are kept.
+    pub energy_compliance: Option<f32>,
+}
+
+impl Kind<4, 0, 2> for Flesh {
+    #[inline(always)]
+    fn project<T: Number>(self, places: &mut [Vector<T>; 4], w: [T; 4], _rest: [T; 0], multipliers: &mut [T; 2]) {
+        let any = w[0];
+        if let Some(compliance) = self.volume_compliance {
+            let constraint = volume(*places, any.constant(self.volume));
+            apply(constraint, places, w, any.constant(compliance), &mut multipliers[0]);
+        }
+        if let Some(compliance) = self.energy_compliance {
+            let constraint = energy(*places, [any.constant(self.arm); 4]);
+            apply(constraint, places, w, any.constant(compliance), &mut multipliers[1]);
+        }
+    }
+}
+
+/// Tetrahedra below a volume are brought up to it; others are left alone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fill(pub(super) f32);
+
+impl Kind<4, 0, 0> for Fill {
+    #[inline(always)]
+    fn project<T: Number>(self, places: &mut [Vector<T>; 4], w: [T; 4], _rest: [T; 0], _multipliers: &mut [T; 0]) {
+        let zero = w[0].constant(0.0);
+        let Constraint { value, gradient } = volume(*places, w[0].constant(self.0));
+        let one_sided = Constraint { value: value.lesser(zero), gradient };
+        apply(one_sided, places, w, zero, &mut zero.constant(0.0));
+    }
+}
+
+#[inline(always)]
+fn apply<T: Number, const N: usize>(
+    constraint: Constraint<T, N>,
+    places: &mut [Vector<T>; N],
+    w: [T; N],
+    compliance: T,
+    multiplier: &mut T,
+) {
+    let step = constraint.project(w, compliance, *multiplier);
+    for n in 0..N {
+        places[n] = add(places[n], step.moves[n]);
+    }
+    *multiplier = *multiplier + step.multiplier;
+}
