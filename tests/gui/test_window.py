@@ -18,7 +18,7 @@ def test_long_work_shows_progress_and_esc_stops_it(blender):
 
 
 def test_automatic_weights_show_progress_and_are_one_undo_step(blender):
-    seen = blender.run("automatic_weights", timeout=300, size=(1100, 800))
+    seen = blender.run("automatic_weights", timeout=600, size=(1100, 800))
     assert max(seen["progress"]) > 0 and seen["groups"] > 2
 
 
