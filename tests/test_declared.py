@@ -23,6 +23,8 @@ def params_classes(addon):
         addon.check.params.CheckParams,
         addon.retarget.params.RetargetParams,
         addon.embed.params.EmbedParams,
+        addon.refine.params.RefineParams,
+        addon.refine.params.CorrectiveParams,
         addon.preferences.Preferences,
     ]
 

@@ -6,6 +6,7 @@ are checked here.
 """
 
 import math
+import sys
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from numbers import Real
 from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
@@ -83,9 +84,13 @@ def check(name: str, value: Any, kind: Any, one: Setting) -> None:
     if one.choices:
         if value not in one.choices:
             raise SettingError(f"{name} is {value!r}, but must be one of {', '.join(one.choices)}")
-    elif _is_number(value) and _scalar(kind) in (int, float) and not one.least <= value <= one.most:
-        # What is not a number is in no range.
+    elif _is_number(value) and _scalar(kind) in (int, float) and not _in_range(value, one):
         raise SettingError(f"{name} is {_shown(value, one)}, but must {_range(one)}")
+
+
+def _in_range(value: Any, one: Setting) -> bool:
+    """What is not a number is in no range, nor is what no double can hold."""
+    return bool(one.least <= value <= one.most and abs(value) <= sys.float_info.max)
 
 
 def from_json(kind: type[P], values: Any) -> P:

@@ -99,6 +99,56 @@ def weights(rng, obj):
     return command.weights, [action, "--object", str(rng.choice(["Coat", "Coat", "Coat", "Rig", ""])), *given]
 
 
+def more_targets(rng):
+    """Of the operations on whole characters: names of objects, some of them wrong or twice."""
+    names = [str(rng.choice(["Coat", "Coat", "Sleeve", "Rig", "Nobody", ""])) for _ in range(int(rng.integers(1, 4)))]
+    return [argument for name in names for argument in ("--target", name)]
+
+
+def automatic(rng, _obj):
+    kind = scenes.part("autoskin.params").AutoskinParams
+    rig = ["--armature", str(rng.choice(["Rig", "Coat", "Nobody"]))] if rng.random() < 0.4 else []
+    return command.automatic_weights, [*more_targets(rng), *rig, "--settings", settings_file(kind, rng), *outputs(rng)]
+
+
+def retarget(rng, _obj):
+    kind = scenes.part("retarget.params").RetargetParams
+    source = str(rng.choice(["Body", "Rig", "Donor Rig", "Donor", "Nobody"]))
+    given = ["--source", source, *more_targets(rng), "--settings", settings_file(kind, rng)]
+    return command.retarget, [*given, *outputs(rng)]
+
+
+def embed(rng, _obj):
+    kind = scenes.part("embed.params").EmbedParams
+    source = str(rng.choice(["Donor Rig", "Donor Rig", "Rig", "Coat", "Nobody"]))
+    given = ["--source", source, *more_targets(rng), "--settings", settings_file(kind, rng)]
+    return command.embed_armature, [*given, *outputs(rng)]
+
+
+def refine(rng, _obj):
+    names = list(scenes.addon.declared.declared(scenes.part("refine.params").CorrectiveParams))
+    given = [f"--{name.replace('_', '-')}={JUNK[int(rng.integers(len(JUNK)))]}" for name in rng.choice(names, 2)]
+    action = str(rng.choice(["correctives", "cache", "remove", "dance"]))
+    target = str(rng.choice(["Sleeve", "Sleeve", "Coat", "Rig", "Nobody"]))
+    frames = ["--frames", str(rng.integers(-2, 3)), str(rng.choice([1, 2, 10**12]))] if rng.random() < 0.6 else []
+    cache = ["--cache", FOLDER / str(rng.choice(FILES))] if rng.random() < 0.6 else []
+    given = given[: int(rng.integers(3))]
+    return command.refine, [action, "--object", target, *given, *frames, *cache, *outputs(rng)]
+
+
+# The first three belong to somebody.
+FILES = ["notes.json", "scene.blend", "old.pc2", "new.json", "new.pc2", "new.mdd", "no folder/x.json"]
+
+
+def outputs(rng):
+    """Reports and saved files at all kinds of places."""
+    found = []
+    for name in ("--report", "--save"):
+        if rng.random() < 0.3:
+            found += [name, FOLDER / str(rng.choice(FILES))]
+    return found
+
+
 def damage(path, rng):
     content = bytearray(path.read_bytes())
     match int(rng.integers(5)):
@@ -117,10 +167,17 @@ def case(make, rng):
     coat = builders.grid("Coat", 5, z=0.05)
     builders.paint(coat, Arm__L=0.3, Arm__R=0.7)
     coat.modifiers.new("Armature", "ARMATURE").object = rig
+    builders.limb("Donor")
+    builders.limb("Sleeve", length=2.4)
+    for name in FILES:
+        (FOLDER / name).unlink(missing_ok=True)
+    for name in FILES[:3]:
+        (FOLDER / name).write_text("mine")
     rig.pose.bones["Arm.L"].rotation_mode = "XYZ"
     rig.pose.bones["Arm.L"].rotation_euler = (0.5, 0.3, 0)
     bpy.context.view_layer.update()
-    before = scenes.digests([coat])
+    objects = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+    before = scenes.digests(objects)
     function, given = make(rng, coat)
     out, error = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
@@ -129,14 +186,15 @@ def case(make, rng):
     assert code in (0, 1, 2) and not any(word in said for word in NEVER), f"exit code {code}: {said[-400:]}"
     if code:
         assert said.strip(), "refused without a sentence"
-        assert scenes.digests([coat]) == before, "refused, and weights changed"
-    scenes.check_sound([coat], before)
+        assert scenes.digests(objects) == before, "refused, and weights changed"
+    scenes.check_sound(objects, before)
+    assert all((FOLDER / name).read_text() == "mine" for name in FILES[:3]), "a foreign file was overwritten"
     return f"exit code {code}"
 
 
 if __name__ == "__main__":
     run = Run("settings and files", cases=1_000_000)
-    makers = [transfer, arguments, sculpt, weights]
+    makers = [transfer, arguments, sculpt, weights, automatic, retarget, embed, refine]
     for seed, generator in run.cases():
         chosen = makers[int(generator.integers(len(makers)))]
         run.attempt(seed, chosen.__name__, case, chosen, generator)

@@ -252,6 +252,31 @@ class TestInThisProcess:
             assert transfer("--source", "Body", "--target", "Coat", output, path) == 1
         assert path.read_bytes() == before
 
+    def test_no_output_of_refine_costs_a_file(self, addon, tmp_path, capsys):
+        """Not the file that is opened, not another output, not a foreign file."""
+        builders.limb("Arm")
+        blend, notes, new = (tmp_path / name for name in ("arm.blend", "notes.pc2", "new.pc2"))
+        bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+        notes.write_text("mine")
+        before = blend.read_bytes()
+        job = ["cache", str(blend), "--object", "Arm", "--frames", "1", "2"]
+        for outputs in (
+            ["--cache", new, "--report", new],
+            ["--cache", new, "--report", new, "--overwrite"],
+            ["--cache", new, "--save", new, "--overwrite"],
+            ["--cache", new, "--report", blend],
+            ["--cache", new, "--report", blend, "--overwrite"],
+            ["--cache", notes],
+            ["--cache", new, "--save", blend],
+        ):
+            assert addon.headless.command_line.refine([*job, *map(str, outputs)]) == 1, outputs
+            assert "skinwright: " in capsys.readouterr().err
+            assert blend.read_bytes() == before and notes.read_text() == "mine" and not new.exists()
+        report = tmp_path / "report.json"
+        for _ in range(2):
+            assert addon.headless.command_line.refine([*job, "--cache", str(new), "--report", str(report)]) == 0
+            new.unlink()
+
     def test_settings_go_through_json_unchanged(self, addon):
         params = addon.transfer.TransferParams(
             max_distance=0.25, mask=addon.transfer.Mask("Mask", "PAINTED", invert=True), island_policy="rigid"

@@ -34,6 +34,7 @@ def steps(
     before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
 ) -> jobs.Jobs[AutoskinReport]:
     """The same in steps: all are computed before the first is written, and all are written or none."""
+    objects = list(dict.fromkeys(objects))  # one named twice is one
     targets = read(objects, rig, params)
     seen = Watched([*objects, *(target.rig for target in targets)])
     answers = yield from seen.during(compute(targets, params))

@@ -64,6 +64,7 @@ def steps(
 ) -> Jobs[EmbedReport]:
     """The same, job by job. Nothing is made before all is computed."""
     source = _rig_of(source)
+    targets = list(dict.fromkeys(targets))  # one named twice is one
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")

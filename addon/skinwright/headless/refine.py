@@ -1,6 +1,7 @@
 """`skinwright refine ACTION [file.blend] --object NAME`: corrective keys and cached actions without a window."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import bpy
 
 from .. import files, jobs, native
 from ..declared import declared, described, from_json
+from ..errors import Refused
 from ..refine import cache, correctives
 from ..refine.params import CacheFormat, CorrectiveParams
 from ..scene import blend_file, mesh_cache
@@ -38,11 +40,8 @@ def run(options: argparse.Namespace, value: Callable[[str], object]) -> int:
     """Do it and say so; `value` reads a setting. Raises Refused or OSError."""
     if native.problem():
         raise SceneError(native.problem())
-    given = {name.removeprefix("set "): text for name, text in vars(options).items() if name.startswith("set ")}
-    params = from_json(CorrectiveParams, {name: value(text) for name, text in given.items() if text is not None})
-    outputs = [path for path in (options.cache, options.report, options.save) if path]
-    for path in outputs:
-        files.check_output(path, others=[o for o in outputs if o != path], overwrite=options.overwrite)
+    params = _params(options, value)
+    _check_outputs(options)
     if options.blend:
         blend_file.open_file(options.blend)
     report = ACTIONS[options.action](options, blend_file.mesh_named(options.object), params)
@@ -52,6 +51,31 @@ def run(options: argparse.Namespace, value: Callable[[str], object]) -> int:
         files.write_report(options.report, report.to_json(), overwrite=options.overwrite)
     print(report if isinstance(report, str) else report.sentence())
     return 0
+
+
+def _params(options: argparse.Namespace, value: Callable[[str], object]) -> CorrectiveParams:
+    """The settings given as arguments; a wrong type is wrong usage, as for the other commands."""
+    given = {name.removeprefix("set "): text for name, text in vars(options).items() if name.startswith("set ")}
+    try:
+        return from_json(CorrectiveParams, {name: value(text) for name, text in given.items() if text is not None})
+    except Refused:
+        raise
+    except ValueError as error:
+        print(f"skinwright: {error}", file=sys.stderr)
+        raise SystemExit(2) from error
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Before anything is done: no output may cost a file, and no two may be one."""
+    blends = [options.blend] if options.blend else blend_file.opened()
+    overwrite, save = options.overwrite, [options.save] if options.save else []
+    if options.report:
+        others = [*blends, *save, *([options.cache] if options.cache else [])]
+        files.check_output(options.report, others=others, overwrite=overwrite, replaces=files.REPORT)
+    if options.cache:
+        files.check_output(options.cache, others=[*blends, *save], overwrite=overwrite)
+    if options.save:  # also over the file that was opened, but only if asked to
+        files.check_output(options.save, overwrite=overwrite)
 
 
 def _correctives(options: argparse.Namespace, obj: bpy.types.Object, params: CorrectiveParams) -> Report:

@@ -22,17 +22,23 @@ FORMATS: Choices = {
 class RefineParams(Params):
     """How skin is solved; names and defaults are those of the native Refiner."""
 
-    stretch: float = setting(1.0, "Stiffness", "Resistance of skin and flesh to being stretched; 0 off", soft_most=10)
+    stretch: float = setting(
+        1.0, "Stiffness", "Resistance of skin and flesh to being stretched; 0 off", most=1e6, soft_most=10
+    )
     volume: float = setting(
         1.0, "Volume", "How exactly flesh keeps its volume; 0 off, 1 exactly", most=1, unit="FACTOR"
     )
     bind: float = setting(
-        1.08, "Bulge Limit", "Farthest skin may come from its bone, as a multiple of rest; 0 off", soft_most=1.5
+        1.08,
+        "Bulge Limit",
+        "Farthest skin may come from its bone, as a multiple of rest; 0 off",
+        most=1000,
+        soft_most=1.5,
     )
-    energy: float = setting(0.1, "Regularity", "Resistance of flesh to being sheared; 0 off", soft_most=10)
+    energy: float = setting(0.1, "Regularity", "Resistance of flesh to being sheared; 0 off", most=1e6, soft_most=10)
     self_collision: bool = setting(True, "Self-Collision", "Keep skin of neighbouring bones and of limbs apart")
     cell: float = setting(
-        0.0, "Cell Size", "Edge of a lattice cell in the mesh's own units; 0 takes 1.5 % of the diagonal"
+        0.0, "Cell Size", "Edge of a lattice cell in the mesh's own units; 0 takes 1.5 % of the diagonal", most=1e9
     )
     threads: int = threads()
 

@@ -43,7 +43,7 @@ def steps(
     before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
 ) -> Jobs[RetargetReport]:
     """The same, job by job. Nothing is written before all is computed; `before_write` is told when writing begins."""
-    pair = read_pair(context, source, targets, params)
+    pair = read_pair(context, source, list(dict.fromkeys(targets)), params)  # one named twice is one
     seen = Watched([*pair.source.meshes, *pair.target.meshes, pair.source.armature, pair.target.armature])
     result = yield from seen.during(compute(pair, params))
     return write(pair, result, params, before_write)

@@ -2,6 +2,9 @@
 
 use crate::error::{Error, Result};
 
+/// Stiffest that anything may be: beyond it is as hard as single precision tells.
+const MOST: f64 = 1e6;
+
 /// The settings of a [`super::Refiner`]; each of the five constraints can be switched off with 0 or false.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -32,10 +35,10 @@ impl Settings {
         let Self { cell, stretch, volume, bind, energy, .. } = *self;
         let checks = [
             ("cell", cell.unwrap_or(1.0), cell.is_none_or(|cell| cell.is_finite() && cell > 0.0), "must be positive"),
-            ("stretch", stretch, stretch.is_finite() && stretch >= 0.0, "must be 0 or positive"),
+            ("stretch", stretch, (0.0..=MOST).contains(&stretch), "must be from 0 to 1e6"),
             ("volume", volume, (0.0..=1.0).contains(&volume), "must be from 0 to 1"),
-            ("bind", bind, bind == 0.0 || (bind.is_finite() && bind >= 1.0), "must be 0 (off), or 1 or more"),
-            ("energy", energy, energy.is_finite() && energy >= 0.0, "must be 0 or positive"),
+            ("bind", bind, bind == 0.0 || (1.0..=1000.0).contains(&bind), "must be 0 (off), or from 1 to 1000"),
+            ("energy", energy, (0.0..=MOST).contains(&energy), "must be from 0 to 1e6"),
         ];
         match checks.into_iter().find(|check| !check.2) {
             Some((name, value, _, must)) => Err(Error::InvalidParameter { name, value, must }),
