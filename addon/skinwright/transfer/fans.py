@@ -40,6 +40,4 @@ def rows(given: Rows, quads: Quads) -> Rows:
     shares = of_corners.values / np.maximum(sums, np.finfo(np.float32).tiny)[entry]
     centres = csr.from_entries(entry // 4, of_corners.bones, shares / 4, len(quads.corners))
     indptr = np.concatenate([given.indptr, given.indptr[-1] + centres.indptr[1:]])
-    return Rows(
-        indptr, np.concatenate([given.bones, centres.bones]), np.concatenate([given.values, centres.values])
-    )
+    return Rows(indptr, np.concatenate([given.bones, centres.bones]), np.concatenate([given.values, centres.values]))
