@@ -216,10 +216,10 @@ embed-eval: .venv/bench.stamp $(BODY)
 refine-eval: .venv/bench.stamp
 	.venv/bin/python bench/refine_eval.py
 
-## make retarget-eval  weights of one character on another, against known answers: out/retarget_eval.md and pictures
+## make retarget-eval  weights of one character on another, against known answers: bench/retarget_results.md, pictures in out
 .PHONY: retarget-eval
 retarget-eval: .venv/bench.stamp $(BODY)
-	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out
+	.venv/bin/python bench/retarget_eval.py --body $(BODY) --out out --table bench/retarget_results.md
 
 ## make quality-eval  transferred weights against those that artists painted: bench/quality_results.md and .png
 .PHONY: quality-eval

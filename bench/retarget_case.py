@@ -7,6 +7,7 @@ interpolated.
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from dataclasses import dataclass, replace
@@ -111,6 +112,24 @@ def file_pairs(folder: Path) -> list[Pair]:
     for entry in json.loads((folder / "retarget.json").read_text()):
         source, target = (characters.gltf_character(folder / entry[side]) for side in ("source", "target"))
         pairs.append(Pair(f"{entry['source']} to {entry['target']}", source, target, target.weights))
+    return pairs
+
+
+# Characters that share a skeleton with others of their folder; each is the source of the next.
+_FAMILIES = ("qm_women", "qm_men", "animals")
+
+
+def other_pairs(folder: Path) -> list[Pair]:
+    """Each file of a family as the target of the one before it, but for the pairs of `retarget.json`."""
+    named = {(entry["source"], entry["target"]) for entry in json.loads((folder / "retarget.json").read_text())}
+    pairs = []
+    for family in _FAMILIES:
+        files = sorted(path.relative_to(folder).as_posix() for path in (folder / family).glob("*.glb"))
+        for first, second in itertools.pairwise(files):
+            if (first, second) in named:
+                continue
+            source, target = (characters.gltf_character(folder / name) for name in (first, second))
+            pairs.append(Pair(f"{first} to {second}", source, target, target.weights))
     return pairs
 
 

@@ -460,7 +460,8 @@ def retarget_weights(
     threads: int = 0,
     source_parents: ArrayLike | None = None,
     match_points: Literal["surface", "vertices"] = "surface",
-    registration: bool = False,
+    vertex_order: bool = True,
+    registration: bool = True,
     normal_length: float = 0.02,
     max_distance: float = 0.08,
     max_normal_angle: float = 1.3962634015954636,
@@ -480,10 +481,11 @@ def retarget_weights(
     "skeleton" brings the target into the source's pose and proportions bone by bone and matches by position and normal;
     "biharmonic" matches by biharmonic distances to `landmarks` (L, 2), a source and a target vertex each, to which the
     bones add theirs (`n_pairs` eigenpairs per island). `match_points`: any point of the source's surface, or vertices
-    only. `registration` draws the target onto the source by smooth displacements first. Lengths are shares of the
-    source's bounding-box diagonal: normals that differ by a unit count as `normal_length` apart; matches farther than
-    `max_distance`, with normals more than `max_normal_angle` apart, or that stretch their surroundings more than
-    `max_stretch` times are filled from around them.
+    only. `vertex_order`: vertices of equal number, where both meshes have the same triangles at about the same places.
+    `registration` draws the target onto the source by smooth displacements first, as far as its bones are long. Lengths
+    are shares of the source's bounding-box diagonal: normals that differ by a unit count as `normal_length` apart;
+    matches farther than `max_distance`, with normals more than `max_normal_angle` apart, or that stretch their
+    surroundings more than `max_stretch` times are filled from around them.
     """
 
 def start_retarget_weights(
@@ -504,7 +506,8 @@ def start_retarget_weights(
     threads: int = 0,
     source_parents: ArrayLike | None = None,
     match_points: Literal["surface", "vertices"] = "surface",
-    registration: bool = False,
+    vertex_order: bool = True,
+    registration: bool = True,
     normal_length: float = 0.02,
     max_distance: float = 0.08,
     max_normal_angle: float = 1.3962634015954636,

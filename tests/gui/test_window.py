@@ -47,3 +47,7 @@ def test_random_actions_leave_everything_in_order(blender):
     seed, actions = os.environ.get("SKINWRIGHT_MONKEY", "1,150").split(",")
     seen = blender.run("monkey", seed, actions, timeout=60 + 3 * int(actions), size=(520, 400))
     assert seen["actions"] == int(actions) and seen["sessions"] > 0
+
+
+def test_weights_are_retargeted_and_undone(blender):
+    assert blender.run("retarget", timeout=300, size=(1100, 1000))["bones"] == 6

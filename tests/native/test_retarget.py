@@ -156,7 +156,7 @@ def test_neither_place_nor_size_nor_facing_matters(native, method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_threads_do_not_change_a_bit(native, method):
-    source, target = tube(), tube(around=18, along=30, length=5.0, radius=0.7, bend=0.5)
+    source, target = tube(around=40, along=80), tube(around=42, along=90, length=5.0, radius=0.7, bend=0.5)
     one, three = (retarget(native, source, target, method=method, threads=n) for n in (1, 3))
     assert np.array_equal(one.weights.to_dense(), three.weights.to_dense())
     assert np.array_equal(one.points, three.points)
@@ -182,6 +182,71 @@ def test_seams_do_not_tear(native):
     whole = retarget(native, source, target).weights.to_dense()
     cut = retarget(native, source, split).weights.to_dense()
     assert np.abs(cut - whole[target.triangles.ravel()]).max() < 1e-6
+
+
+def shuffled(body, seed=2):
+    """The same surface and triangles in the same places, its vertices in another order."""
+    order = np.random.default_rng(seed).permutation(len(body.positions))
+    place = np.argsort(order)
+    return Character(
+        body.positions[order], place[body.triangles], body.weights[order],
+        body.names, body.parents, body.frames, body.lengths,
+    )  # fmt: skip
+
+
+def test_shapes_of_one_mesh_are_matched_by_number(native):
+    source, target = tube(), tube(length=5.0, radius=0.7, bend=0.5)
+    result = retarget(native, source, target)
+    assert result.report["by_number"]
+    assert half_l1(result, source.weights).max() < 1e-6
+    assert np.abs(result.points - source.positions).max() < 1e-6
+    assert not retarget(native, source, target, vertex_order=False).report["by_number"]
+
+
+def test_numbers_that_lie_elsewhere_are_not_believed(native):
+    """Equal triangles, but the tube's vertices are numbered from the other end."""
+    source = tube()
+    target = tube()
+    upside_down = target.positions * (1, -1, -1) + (0, 0, 4.0)
+    target = Character(**{**vars(target), "positions": upside_down, "weights": target.weights[:, ::-1]})
+    result = retarget(native, source, target)
+    assert not result.report["by_number"]
+    assert half_l1(result, target.weights).mean() < 0.05
+
+
+def test_the_order_of_vertices_does_not_matter(native):
+    source, target = tube(), tube(around=18, along=30, length=5.0, radius=0.7, bend=0.5)
+    order = np.random.default_rng(2).permutation(len(target.positions))
+    plain = retarget(native, source, target).weights.to_dense()
+    other = retarget(native, source, shuffled(target)).weights.to_dense()
+    assert np.abs(plain[order] - other).max() < 1e-4
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_soup_of_separate_triangles_gets_weights(native, method):
+    """No two triangles share an edge or a place."""
+    source, body = tube(), tube(around=18, along=30, length=5.0, radius=0.7, bend=0.5)
+    corners = body.positions[body.triangles]
+    middle = corners.mean(axis=1, keepdims=True)
+    positions = (middle + 0.9 * (corners - middle)).reshape(-1, 3)
+    weights = np.repeat(body.weights[body.triangles].mean(axis=1), 3, axis=0)
+    soup = Character(
+        positions, np.arange(len(positions)).reshape(-1, 3), weights,
+        body.names, body.parents, body.frames, body.lengths,
+    )  # fmt: skip
+    result = retarget(native, source, soup, method=method)
+    assert result.report["unweighted"] == 0
+    assert half_l1(result, weights).mean() < 0.08
+
+
+def test_biharmonic_matches_are_where_the_weights_come_from(native):
+    source, target = tube(), tube(around=18, along=30, length=5.0, radius=0.7, bend=0.5)
+    result = retarget(native, source, target, method="biharmonic")
+    assert result.report["by_landmarks"] == len(target.positions)
+    heights = np.clip(result.points[:, 2] / 4.0 * 3, 0, 3)
+    expected = np.stack([np.clip(1 - abs(heights - 0.5 - j), 0, 1) for j in range(3)], 1)
+    expected[heights < 0.5], expected[heights > 2.5] = (1, 0, 0), (0, 0, 1)
+    assert half_l1(result, expected).mean() < 0.03
 
 
 def test_a_bone_without_a_partner_gives_its_share_to_its_ancestor(native):

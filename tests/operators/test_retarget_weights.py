@@ -71,6 +71,28 @@ def test_the_bone_map_wins_and_can_be_edited(man, child, tmp_path):
     assert settings.bone_map["Hand.L"].source == ""
 
 
+def test_several_characters_at_once(man, child):
+    """Each by its own armature; the bone map of the panel holds for the one it was made for."""
+    settings = bpy.context.scene.skinwright.retarget
+    _, others = limb("Aunt", length=2.5, radius=0.28, around=14, at=(-4, 0, 0))
+    builders.select(*others)
+    bpy.ops.skinwright.match_bones()
+    settings.bone_map["Hand.L"].source = ""
+    assert retarget([*child[1], *others]) == {"FINISHED"}
+    assert max(error_of(obj, ARM, 2.0).mean() for obj in child[1]) < 0.05
+    assert not builders.dense(others[0], ARM)[:, 2].any()
+
+
+def test_one_bad_character_of_several_stops_all(man, child):
+    rig, others = limb("Aunt", at=(-4, 0, 0))
+    for bone in rig.data.bones:
+        bone.use_deform = False
+    before = [builders.weights(obj) for obj in (*child[1], *others)]
+    with pytest.raises(RuntimeError, match="Aunt Rig has no bone that deforms"):
+        retarget([*child[1], *others])
+    assert [builders.weights(obj) for obj in (*child[1], *others)] == before
+
+
 def test_locked_groups_and_other_groups_stay(man, child):
     obj = child[1][0]
     builders.paint(obj, pin=0.3, Hand__L=0.25)

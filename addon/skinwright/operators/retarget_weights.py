@@ -5,7 +5,7 @@ from bpy.types import Context, Event, Object
 from .. import jobs, preferences
 from ..registration import registration
 from ..retarget import RetargetReport, steps
-from ..scene import armature
+from ..scene import armature, attributes
 from ..settings.properties import last_used
 from ..settings.retarget import RetargetSettings
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
@@ -50,15 +50,19 @@ class SKINWRIGHT_OT_retarget_weights(LongWork, RetargetSettings, SkinwrightOpera
 
     def complete(self, context: Context, report: RetargetReport) -> set[str]:
         """Say what was done, and leave what it was done with to the panel."""
+        if self.show_correspondence:
+            attributes.show_colors(context.area)
         last_used(self.properties, context.scene.skinwright.retarget, RetargetSettings.__annotations__)
         return self.tell(report.sentence(), report.all_warnings())
 
     def _steps(self, context: Context) -> jobs.Jobs[RetargetReport]:
         settings, chosen = context.scene.skinwright.retarget, targets(context)
-        rig = armature.find(chosen[0])
-        given = settings.given_map(settings.source, rig) if rig else {}
-        params = self.to_params(preferences.threads(context), given, settings.given_landmarks())
-        return steps(context, settings.source, chosen, params, before_write=self.keep_before)
+        params = self.to_params(preferences.threads(context), settings.given_landmarks())
+
+        def map_of(rig: Object) -> dict[str, str]:
+            return settings.given_map(settings.source, rig)
+
+        return steps(context, settings.source, chosen, params, self.keep_before, map_of)
 
 
 def targets(context: Context) -> list[Object]:

@@ -49,9 +49,10 @@ class Pair:
 def read_pair(
     context: bpy.types.Context, source: bpy.types.Object, targets: Sequence[bpy.types.Object], params: RetargetParams
 ) -> Pair:
-    """Read and check both. Raises SceneError with the object, the problem and the cure."""
+    """Read and check both; the targets are of one character. Raises SceneError with object, problem and cure."""
     giver = _source(context, source)
-    taker = _target(targets)
+    ((rig, meshes),) = by_character(targets)
+    taker = _character(rig, meshes)
     if giver.armature == taker.armature:
         raise SceneError(
             f"{giver.armature.name} deforms the source and the target: use Transfer Weights between meshes of "
@@ -97,19 +98,19 @@ def _source(context: bpy.types.Context, source: bpy.types.Object) -> Character:
     return _character(rig, meshes)
 
 
-def _target(targets: Sequence[bpy.types.Object]) -> Character:
-    rigs = {obj.name: armature.find(obj) for obj in targets}
-    for name, rig in rigs.items():
+def by_character(
+    targets: Sequence[bpy.types.Object],
+) -> list[tuple[bpy.types.Object, list[bpy.types.Object]]]:
+    """The meshes of each character with its armature. Raises SceneError for a mesh without one."""
+    characters: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    for obj in targets:
+        rig = armature.find(obj)
         if rig is None:
-            raise SceneError(f"{name} has no armature: give it an Armature modifier with the skeleton it shall follow")
-    if len(set(rigs.values())) > 1:
-        raise SceneError(
-            f"{targets[0].name} and {next(n for n in rigs if rigs[n] != rigs[targets[0].name])} follow different "
-            "armatures: select the meshes of one character"
-        )
-    rig = rigs[targets[0].name]
-    assert rig is not None
-    return _character(rig, list(targets))
+            raise SceneError(
+                f"{obj.name} has no armature: give it an Armature modifier with the skeleton it shall follow"
+            )
+        characters.setdefault(rig, []).append(obj)
+    return list(characters.items())
 
 
 def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:

@@ -43,10 +43,16 @@ class RetargetParams(Params):
         },
         native=True,
     )
+    vertex_order: bool = setting(
+        True,
+        "Same Base Mesh",
+        "Match vertices by their order where both characters are shapes of one mesh",
+        native=True,
+    )
     registration: bool = setting(
-        False,
+        True,
         "Fit Surfaces",
-        "Draw the target onto the source by smooth displacements first, for other proportions of one kind of body",
+        "Draw the target onto the source by smooth displacements first, so that knees, elbows and waists meet",
         native=True,
     )
     n_pairs: int = setting(

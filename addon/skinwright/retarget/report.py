@@ -38,3 +38,27 @@ class RetargetReport:
     def to_json(self) -> dict[str, Any]:
         """Plain values only."""
         return asdict(self) | {"sentence": self.sentence()}
+
+
+def together(reports: list[RetargetReport]) -> RetargetReport:
+    """One report of several characters, at least one."""
+    if len(reports) == 1:
+        return reports[0]
+    vertices = sum(report.vertices for report in reports)
+    confidence = sum(report.confidence * report.vertices for report in reports) / vertices
+    names = dict.fromkeys(stage for report in reports for stage in report.seconds)
+    return RetargetReport(
+        source=reports[0].source,
+        target=", ".join(report.target for report in reports),
+        meshes=[name for report in reports for name in report.meshes],
+        vertices=vertices,
+        matched=sum(report.matched for report in reports),
+        filled=sum(report.filled for report in reports),
+        unweighted=sum(report.unweighted for report in reports),
+        confidence=round(confidence, 4),
+        bone_map=[entry for report in reports for entry in report.bone_map],
+        inherited=list(dict.fromkeys(pair for report in reports for pair in report.inherited)),
+        landmarks=sum(report.landmarks for report in reports),
+        seconds={name: sum(report.seconds.get(name, 0.0) for report in reports) for name in names},
+        warnings=list(dict.fromkeys(warning for report in reports for warning in report.warnings)),
+    )

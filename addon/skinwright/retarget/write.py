@@ -12,29 +12,34 @@ from ..scene import attributes, object_state, vertex_groups
 from .compute import Result
 from .inputs import Character, Pair
 from .params import RetargetParams
-from .report import RetargetReport
+from .report import RetargetReport, together
 
 ATTRIBUTE = "Correspondence"
 _FEW = 8
 
 
 def write(
-    pair: Pair,
-    result: Result,
+    done: list[tuple[Pair, Result]],
     params: RetargetParams,
     before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
 ) -> RetargetReport:
-    """Write every mesh of the target, or none. Locked groups and groups that are not bones stay as they are."""
+    """Write every mesh of every target, or none. Locked groups and groups that are not bones stay as they are."""
+    targets = [obj for pair, _ in done for obj in pair.target.meshes]
     if before_write:
-        before_write(pair.target.meshes)
-    warnings = _warnings(pair, result)
-    shown = [*pair.source.meshes, *pair.target.meshes] if params.show_correspondence else []
-    with object_state.all_or_nothing(pair.target.meshes), attributes.all_or_nothing(shown, ATTRIBUTE):
-        for obj, start, end in _parts(pair.target):
-            warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
-        if params.show_correspondence:
+        before_write(targets)
+    shown = [*done[0][0].source.meshes, *targets] if params.show_correspondence else []
+    with object_state.all_or_nothing(targets), attributes.all_or_nothing(shown, ATTRIBUTE):
+        reports = [_write_character(pair, result) for pair, result in done]
+        for pair, result in done if params.show_correspondence else ():
             _show(pair, result)
-        return _report(pair, result, warnings)
+        return together(reports)
+
+
+def _write_character(pair: Pair, result: Result) -> RetargetReport:
+    warnings = _warnings(pair, result)
+    for obj, start, end in _parts(pair.target):
+        warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
+    return _report(pair, result, warnings)
 
 
 def _parts(character: Character) -> list[tuple[bpy.types.Object, int, int]]:

@@ -26,7 +26,14 @@ def write_colors(obj: bpy.types.Object, name: str, colors: NDArray[np.float32]) 
         attributes.remove(attributes[name])
     attribute = attributes.new(name, "FLOAT_COLOR", "POINT")
     attribute.data.foreach_set("color", np.ascontiguousarray(colors).ravel())
+    obj.data.color_attributes.active_color = obj.data.color_attributes[name]
     obj.data.update()
+
+
+def show_colors(area: bpy.types.Area | None) -> None:
+    """Let a 3D view show the active color attribute; other editors stay."""
+    if area and area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
+        area.spaces.active.shading.color_type = "VERTEX"
 
 
 @contextmanager

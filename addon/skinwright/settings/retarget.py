@@ -28,6 +28,7 @@ class RetargetSettings:
         if self.method == "BIHARMONIC":
             layout.prop(self, "n_pairs")
         layout.prop(self, "match_points")
+        layout.prop(self, "vertex_order")
         layout.prop(self, "registration")
         layout.prop(self, "smoothing_iterations")
         column = layout.column()
@@ -36,9 +37,9 @@ class RetargetSettings:
         layout.prop(self, "max_influences")
         layout.prop(self, "show_correspondence")
 
-    def to_params(self, threads: int, bone_map: dict[str, str], landmarks: tuple[Landmark, ...] = ()) -> RetargetParams:
+    def to_params(self, threads: int, landmarks: tuple[Landmark, ...] = ()) -> RetargetParams:
         """As plain values. Raises SettingError for a value outside its range."""
-        return RetargetParams(**values(self, RetargetParams), threads=threads, bone_map=bone_map, landmarks=landmarks)
+        return RetargetParams(**values(self, RetargetParams), threads=threads, landmarks=landmarks)
 
 
 class SKINWRIGHT_PG_bone_pair(PropertyGroup):

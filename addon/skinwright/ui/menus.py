@@ -15,6 +15,11 @@ def _transfer_weights(menu: Menu, _context: Context) -> None:
     menu.layout.operator("skinwright.transfer_weights", text="Transfer Weights (Skinwright)")
 
 
+def _link_weights(menu: Menu, context: Context) -> None:
+    _transfer_weights(menu, context)
+    menu.layout.operator("skinwright.retarget_weights", text="Retarget Weights (Skinwright)")
+
+
 def _automatic_weights(menu: Menu, _context: Context) -> None:
     menu.layout.separator()
     menu.layout.operator("skinwright.automatic_weights", text="Automatic Weights (Skinwright)")
@@ -33,7 +38,7 @@ def _sculpt_weights(menu: Menu, _context: Context) -> None:
 ENTRIES = (
     (VIEW3D_MT_object_parent, _automatic_weights),
     (VIEW3D_MT_paint_weight, _paint_weight),
-    (VIEW3D_MT_make_links, _transfer_weights),
+    (VIEW3D_MT_make_links, _link_weights),
     (VIEW3D_MT_sculpt, _sculpt_weights),
 )
 

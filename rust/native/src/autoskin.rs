@@ -1,7 +1,5 @@
 //! `automatic_weights`.
 
-use std::sync::Arc;
-
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use skinwright_core::autoskin::{self as core, Method, Settings, Skeleton};
@@ -9,8 +7,8 @@ use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
 use crate::desparsify::segments;
-use crate::error::{InvalidParameter, enter, to_python};
-use crate::job::Job;
+use crate::error::{InvalidParameter, to_python};
+use crate::job::call_and_job;
 use crate::memory;
 use crate::ranges;
 use crate::skinning::Stack;
@@ -40,49 +38,27 @@ impl Input {
     }
 }
 
-/// Computes weights for the bones of an armature from scratch.
-#[pyfunction]
-#[pyo3(signature = (positions, triangles, bone_segments, bone_parents, *, method="heat", max_influences=4,
-    resolution=128.0, stiffness=5.0, threads=0))]
-#[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-pub fn automatic_weights(
-    py: Python<'_>,
-    positions: Matrix<'_, f32>,
-    triangles: Matrix<'_, u32>,
-    bone_segments: Stack<'_, f32>,
-    bone_parents: Vector<'_, i32>,
-    method: &str,
-    #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
-    resolution: f64,
-    stiffness: f64,
-    #[pyo3(from_py_with = ranges::threads)] threads: usize,
-) -> PyResult<AutoWeights> {
-    let settings = settings(method, max_influences, resolution, stiffness)?;
-    let input = input(&positions, &triangles, &bone_segments, &bone_parents, settings)?;
-    let result = enter(py, threads, || input.run(&Progress::default()))?;
-    present(py, result)
-}
-
-/// The same on threads of its own, to be polled.
-#[pyfunction]
-#[pyo3(signature = (positions, triangles, bone_segments, bone_parents, *, method="heat", max_influences=4,
-    resolution=128.0, stiffness=5.0, threads=0))]
-#[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-pub fn start_automatic_weights(
-    positions: Matrix<'_, f32>,
-    triangles: Matrix<'_, u32>,
-    bone_segments: Stack<'_, f32>,
-    bone_parents: Vector<'_, i32>,
-    method: &str,
-    #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
-    resolution: f64,
-    stiffness: f64,
-    #[pyo3(from_py_with = ranges::threads)] threads: usize,
-) -> PyResult<Job> {
-    let settings = settings(method, max_influences, resolution, stiffness)?;
-    let input = Arc::new(input(&positions, &triangles, &bone_segments, &bone_parents, settings)?);
-    let work = move |progress: &Progress| input.run(progress);
-    Job::start(threads, work, |py, result| Ok(Py::new(py, present(py, result)?)?.into_any()))
+call_and_job! {
+    /// Computes weights for the bones of an armature from scratch.
+    automatic_weights -> AutoWeights,
+    /// The same on threads of its own, to be polled.
+    start_automatic_weights,
+    signature = (positions, triangles, bone_segments, bone_parents, *, method="heat", max_influences=4,
+        resolution=128.0, stiffness=5.0, threads=0),
+    |py, threads,
+        positions: Matrix<'_, f32>,
+        triangles: Matrix<'_, u32>,
+        bone_segments: Stack<'_, f32>,
+        bone_parents: Vector<'_, i32>,
+        method: &str,
+        #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
+        resolution: f64,
+        stiffness: f64,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
+    | {
+        let settings = settings(method, max_influences, resolution, stiffness)?;
+        input(&positions, &triangles, &bone_segments, &bone_parents, settings)?
+    }
 }
 
 fn settings(method: &str, max_influences: usize, resolution: f64, stiffness: f64) -> PyResult<Settings> {

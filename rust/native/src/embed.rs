@@ -7,8 +7,8 @@ use skinwright_core::embed::{self as core, Donor, Method, Template};
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
-use crate::error::{InvalidParameter, enter};
-use crate::job::Job;
+use crate::error::InvalidParameter;
+use crate::job::call_and_job;
 use crate::memory;
 use crate::ranges;
 use crate::weights::Weights;
@@ -110,56 +110,30 @@ impl Input {
     }
 }
 
-/// Puts the bones of a template into a mesh that has none.
-#[pyfunction]
-#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0,
-    donor_positions=None, donor_triangles=None, donor_weights=None, mirror=None, landmarks=None))]
-#[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-pub fn embed_skeleton(
-    py: Python<'_>,
-    positions: Matrix<'_, f32>,
-    triangles: Matrix<'_, u32>,
-    template_heads: Matrix<'_, f32>,
-    template_tails: Matrix<'_, f32>,
-    parents: Vector<'_, i32>,
-    method: &str,
-    #[pyo3(from_py_with = ranges::threads)] threads: usize,
-    donor_positions: Option<Matrix<'_, f32>>,
-    donor_triangles: Option<Matrix<'_, u32>>,
-    donor_weights: Option<&Weights>,
-    mirror: Option<Vector<'_, i32>>,
-    landmarks: Option<Matrix<'_, u32>>,
-) -> PyResult<Embedding> {
-    let donor = DonorInput::new(py, donor_positions.zip(donor_triangles), donor_weights, mirror, landmarks)?;
-    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method, donor)?;
-    let result = enter(py, threads, || input.run(&Progress::default()))?;
-    present(py, result)
-}
-
-/// The same on threads of its own, to be polled.
-#[pyfunction]
-#[pyo3(signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0,
-    donor_positions=None, donor_triangles=None, donor_weights=None, mirror=None, landmarks=None))]
-#[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-pub fn start_embed_skeleton(
-    py: Python<'_>,
-    positions: Matrix<'_, f32>,
-    triangles: Matrix<'_, u32>,
-    template_heads: Matrix<'_, f32>,
-    template_tails: Matrix<'_, f32>,
-    parents: Vector<'_, i32>,
-    method: &str,
-    #[pyo3(from_py_with = ranges::threads)] threads: usize,
-    donor_positions: Option<Matrix<'_, f32>>,
-    donor_triangles: Option<Matrix<'_, u32>>,
-    donor_weights: Option<&Weights>,
-    mirror: Option<Vector<'_, i32>>,
-    landmarks: Option<Matrix<'_, u32>>,
-) -> PyResult<Job> {
-    let donor = DonorInput::new(py, donor_positions.zip(donor_triangles), donor_weights, mirror, landmarks)?;
-    let input = Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method, donor)?;
-    let work = move |progress: &Progress| input.run(progress);
-    Job::start(threads, work, |py, result| Ok(Py::new(py, present(py, result)?)?.into_any()))
+call_and_job! {
+    /// Puts the bones of a template into a mesh that has none.
+    embed_skeleton -> Embedding,
+    /// The same on threads of its own, to be polled.
+    start_embed_skeleton,
+    signature = (positions, triangles, template_heads, template_tails, parents, *, method="medial", threads=0,
+        donor_positions=None, donor_triangles=None, donor_weights=None, mirror=None, landmarks=None),
+    |py, threads,
+        positions: Matrix<'_, f32>,
+        triangles: Matrix<'_, u32>,
+        template_heads: Matrix<'_, f32>,
+        template_tails: Matrix<'_, f32>,
+        parents: Vector<'_, i32>,
+        method: &str,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
+        donor_positions: Option<Matrix<'_, f32>>,
+        donor_triangles: Option<Matrix<'_, u32>>,
+        donor_weights: Option<&Weights>,
+        mirror: Option<Vector<'_, i32>>,
+        landmarks: Option<Matrix<'_, u32>>,
+    | {
+        let donor = DonorInput::new(py, donor_positions.zip(donor_triangles), donor_weights, mirror, landmarks)?;
+        Input::new(&positions, &triangles, &template_heads, &template_tails, &parents, method, donor)?
+    }
 }
 
 fn method_name(method: Method) -> &'static str {

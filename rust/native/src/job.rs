@@ -86,3 +86,40 @@ impl Job {
         }
     }
 }
+
+/// Two Python functions with one list of arguments, written once: `$call` waits for the result, `$start` returns a [`Job`].
+///
+/// The arguments are those of a `#[pyfunction]` without `py`, in the signature's order and with `threads` among them. The block
+/// makes the owned inputs; their `run` is the work, and the module's `present` wraps what it returns.
+macro_rules! call_and_job {
+    (
+        $(#[$call_attribute:meta])*
+        $call:ident -> $returns:ty,
+        $(#[$start_attribute:meta])*
+        $start:ident,
+        signature = $signature:tt,
+        |$py:ident, $threads:ident, $($(#[$($attribute:tt)*])* $name:ident: $kind:ty),+ $(,)?| $inputs:block
+    ) => {
+        $(#[$call_attribute])*
+        #[pyfunction]
+        #[pyo3(signature = $signature)]
+        #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+        pub fn $call($py: Python<'_>, $($(#[$($attribute)*])* $name: $kind),+) -> PyResult<$returns> {
+            let inputs = $inputs;
+            let result = crate::error::enter($py, $threads, || inputs.run(&Progress::default()))?;
+            present($py, result)
+        }
+
+        $(#[$start_attribute])*
+        #[pyfunction]
+        #[pyo3(signature = $signature)]
+        #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
+        pub fn $start($py: Python<'_>, $($(#[$($attribute)*])* $name: $kind),+) -> PyResult<crate::job::Job> {
+            let _ = $py; // Not every operation needs it for its inputs.
+            let inputs = $inputs;
+            let present = |py: Python<'_>, result| Ok(Py::new(py, present(py, result)?)?.into_any());
+            crate::job::Job::start($threads, move |progress: &Progress| inputs.run(progress), present)
+        }
+    };
+}
+pub(crate) use call_and_job;

@@ -7,8 +7,8 @@ use skinwright_core::retarget::{self as core, Character, Correspondence, Landmar
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, Vector, entries, read_only, triples};
-use crate::error::{InvalidParameter, enter};
-use crate::job::Job;
+use crate::error::InvalidParameter;
+use crate::job::call_and_job;
 use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, vectors};
@@ -71,105 +71,81 @@ impl Inputs {
     }
 }
 
-macro_rules! retarget_function {
-    ($(#[$attribute:meta])* $name:ident, $returns:ty, $finish:ident) => {
-        $(#[$attribute])*
-        #[pyfunction]
-        #[pyo3(signature = (source_positions, source_triangles, source_weights, source_frames, source_lengths,
-            target_positions, target_triangles, target_frames, target_lengths, *, bone_map, method="skeleton",
-            landmarks=None, max_influences=0, threads=0, source_parents=None, match_points="surface", registration=false,
-            normal_length=0.02, max_distance=0.08, max_normal_angle=1.3962634015954636, max_stretch=6.0, n_pairs=100,
-            smoothing_iterations=0, smoothing_factor=0.2))]
-        #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
-        pub fn $name(
-            py: Python<'_>,
-            source_positions: Matrix<'_, f32>,
-            source_triangles: Matrix<'_, u32>,
-            source_weights: &Weights,
-            source_frames: Stack<'_, f64>,
-            source_lengths: Vector<'_, f64>,
-            target_positions: Matrix<'_, f32>,
-            target_triangles: Matrix<'_, u32>,
-            target_frames: Stack<'_, f64>,
-            target_lengths: Vector<'_, f64>,
-            bone_map: Vector<'_, i32>,
-            method: &str,
-            landmarks: Option<Matrix<'_, u32>>,
-            #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
-            #[pyo3(from_py_with = ranges::threads)] threads: usize,
-            source_parents: Option<Vector<'_, i32>>,
-            match_points: &str,
-            registration: bool,
-            normal_length: f64,
-            max_distance: f64,
-            max_normal_angle: f64,
-            max_stretch: f64,
-            #[pyo3(from_py_with = ranges::pairs)] n_pairs: usize,
-            #[pyo3(from_py_with = ranges::smoothing)] smoothing_iterations: u32,
-            smoothing_factor: f64,
-        ) -> PyResult<$returns> {
-            let settings = Settings {
-                method: method_of(method)?,
-                match_points: match_points_of(match_points)?,
-                registration,
-                normal_length,
-                max_distance,
-                max_normal_angle,
-                max_stretch,
-                n_pairs,
-                smoothing_iterations,
-                smoothing_factor,
-                max_influences,
-            };
-            let inputs = Inputs {
-                source: Owned {
-                    what: "source",
-                    positions: triples(&source_positions, "source_positions")?,
-                    triangles: triples(&source_triangles, "source_triangles")?,
-                    frames: frames(&source_frames, "source_frames")?,
-                    lengths: entries(&source_lengths),
-                },
-                target: Owned {
-                    what: "target",
-                    positions: triples(&target_positions, "target_positions")?,
-                    triangles: triples(&target_triangles, "target_triangles")?,
-                    frames: frames(&target_frames, "target_frames")?,
-                    lengths: entries(&target_lengths),
-                },
-                weights: source_weights.to_core(py)?,
-                bone_map: entries(&bone_map),
-                source_parents: source_parents.map(|parents| entries(&parents)),
-                landmarks: landmarks.map(|pairs| landmarks_of(&pairs)).transpose()?.unwrap_or_default(),
-                settings,
-            };
-            inputs.expect_memory()?;
-            $finish(py, threads, inputs)
-        }
-    };
-}
-
-retarget_function!(
+call_and_job! {
     /// Weights of one character for another with a matching skeleton.
-    retarget_weights,
-    Retarget,
-    wait
-);
-
-retarget_function!(
+    retarget_weights -> Retarget,
     /// Starts `retarget_weights` on threads of its own.
     start_retarget_weights,
-    Job,
-    start
-);
-
-fn wait(py: Python<'_>, threads: usize, inputs: Inputs) -> PyResult<Retarget> {
-    let result = enter(py, threads, || inputs.run(&Progress::default()))?;
-    present(py, result)
-}
-
-fn start(_: Python<'_>, threads: usize, inputs: Inputs) -> PyResult<Job> {
-    let present = |py: Python<'_>, result| Ok(Py::new(py, present(py, result)?)?.into_any());
-    Job::start(threads, move |progress| inputs.run(progress), present)
+    signature = (source_positions, source_triangles, source_weights, source_frames, source_lengths,
+        target_positions, target_triangles, target_frames, target_lengths, *, bone_map, method="skeleton",
+        landmarks=None, max_influences=0, threads=0, source_parents=None, match_points="surface", vertex_order=true,
+        registration=true, normal_length=0.02, max_distance=0.08, max_normal_angle=1.3962634015954636, max_stretch=6.0,
+        n_pairs=100, smoothing_iterations=0, smoothing_factor=0.2),
+    |py, threads,
+        source_positions: Matrix<'_, f32>,
+        source_triangles: Matrix<'_, u32>,
+        source_weights: &Weights,
+        source_frames: Stack<'_, f64>,
+        source_lengths: Vector<'_, f64>,
+        target_positions: Matrix<'_, f32>,
+        target_triangles: Matrix<'_, u32>,
+        target_frames: Stack<'_, f64>,
+        target_lengths: Vector<'_, f64>,
+        bone_map: Vector<'_, i32>,
+        method: &str,
+        landmarks: Option<Matrix<'_, u32>>,
+        #[pyo3(from_py_with = ranges::influences)] max_influences: usize,
+        #[pyo3(from_py_with = ranges::threads)] threads: usize,
+        source_parents: Option<Vector<'_, i32>>,
+        match_points: &str,
+        vertex_order: bool,
+        registration: bool,
+        normal_length: f64,
+        max_distance: f64,
+        max_normal_angle: f64,
+        max_stretch: f64,
+        #[pyo3(from_py_with = ranges::pairs)] n_pairs: usize,
+        #[pyo3(from_py_with = ranges::smoothing)] smoothing_iterations: u32,
+        smoothing_factor: f64,
+    | {
+        let settings = Settings {
+            method: method_of(method)?,
+            match_points: match_points_of(match_points)?,
+            vertex_order,
+            registration,
+            normal_length,
+            max_distance,
+            max_normal_angle,
+            max_stretch,
+            n_pairs,
+            smoothing_iterations,
+            smoothing_factor,
+            max_influences,
+        };
+        let inputs = Inputs {
+            source: Owned {
+                what: "source",
+                positions: triples(&source_positions, "source_positions")?,
+                triangles: triples(&source_triangles, "source_triangles")?,
+                frames: frames(&source_frames, "source_frames")?,
+                lengths: entries(&source_lengths),
+            },
+            target: Owned {
+                what: "target",
+                positions: triples(&target_positions, "target_positions")?,
+                triangles: triples(&target_triangles, "target_triangles")?,
+                frames: frames(&target_frames, "target_frames")?,
+                lengths: entries(&target_lengths),
+            },
+            weights: source_weights.to_core(py)?,
+            bone_map: entries(&bone_map),
+            source_parents: source_parents.map(|parents| entries(&parents)),
+            landmarks: landmarks.map(|pairs| landmarks_of(&pairs)).transpose()?.unwrap_or_default(),
+            settings,
+        };
+        inputs.expect_memory()?;
+        inputs
+    }
 }
 
 fn present(py: Python<'_>, result: core::Retarget) -> PyResult<Retarget> {
@@ -193,6 +169,7 @@ fn report_dict<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'p
     dict.set_item("bones", report.bones)?;
     dict.set_item("inherited", PyList::new(py, &report.inherited)?)?;
     dict.set_item("without_partner", PyList::new(py, &report.without_partner)?)?;
+    dict.set_item("by_number", report.by_number)?;
     dict.set_item("landmarks", report.landmarks)?;
     dict.set_item("by_landmarks", report.by_landmarks)?;
     dict.set_item("size_ratio", report.size_ratio)?;

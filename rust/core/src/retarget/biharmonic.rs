@@ -4,9 +4,10 @@
 //! dynamics, The Visual Computer 34, 2018, doi:10.1007/s00371-017-1441-1, section 5: a vertex is described by its distances to
 //! the landmarks, divided by the largest of them (Eqs. 20, 21), and takes its weights from the four source vertices whose
 //! descriptions differ least (Eqs. 22, 23), searched within the corresponding region. What is different here: descriptions
-//! hold the normals in the source's pose too, for front and back of a body are alike in distance; regions overlap; the four
-//! are weighed by the difference of their descriptions, which the paper's own distance to the best match would make 1/0;
-//! and each island has a spectrum of its own.
+//! hold logarithms, such that the landmarks nearby decide and the proportions of far limbs do not; landmarks are spread over
+//! the surface, as fingers and faces have most of the bones; descriptions hold the normals in the source's pose too, for
+//! front and back of a body are alike in distance; regions overlap; the four are weighed by the difference of their
+//! descriptions, which the paper's own distance to the best match would make 1/0; and each island has a spectrum of its own.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -17,8 +18,12 @@ use crate::registration::Match;
 
 /// Source vertices that are blended.
 pub const BEST: usize = 4;
-/// Weight of a unit of normal difference beside distances between 0 and 1.
-const ORIENTATION: f64 = 0.15;
+/// Weight of a unit of normal difference beside the logarithms of distances.
+const ORIENTATION: f64 = 1.0;
+/// Share of the largest distance below which a landmark does not tell places apart any more.
+const BESIDE: f64 = 0.02;
+/// Landmarks of an island that are used.
+const MOST: usize = 48;
 /// Difference of descriptions below which a match does not gain any more.
 const GUARD: f64 = 1e-3;
 /// Landmarks without which an island is left to the skeleton.
@@ -74,17 +79,21 @@ pub fn landmarks_of_matches(vertices: &[u32], matches: &[Match]) -> Vec<Landmark
     vertices.iter().zip(matches).map(landmark).collect()
 }
 
-/// The blend for each vertex of the target (V), None where its island has too few landmarks on one island of the source.
-pub fn blends(source: &Described<'_>, target: &Described<'_>, landmarks: &[Landmark]) -> Vec<Option<Blend>> {
+/// The blend for each vertex of the target (V), None where its island has too few landmarks on one island of the source. The
+/// first `given` landmarks are the artist's.
+pub fn blends(
+    source: &Described<'_>,
+    target: &Described<'_>,
+    landmarks: &[Landmark],
+    given: usize,
+) -> Vec<Option<Blend>> {
     let mut blends = vec![None; target.islands.len()];
     for (target_island, source_island) in island_pairs(source, target, landmarks) {
-        let own: Vec<Landmark> = landmarks
-            .iter()
-            .filter(|l| {
-                target.islands[l.target as usize] == target_island && source.islands[l.source as usize] == source_island
-            })
-            .copied()
-            .collect();
+        let on_both = |l: &Landmark| {
+            target.islands[l.target as usize] == target_island && source.islands[l.source as usize] == source_island
+        };
+        let kept = landmarks[..given].iter().filter(|l| on_both(l)).count();
+        let own = spread(landmarks.iter().filter(|l| on_both(l)).copied().collect(), kept, target.embedding);
         let ends = |of: fn(&Landmark) -> u32| own.iter().map(of).collect::<Vec<u32>>();
         let source_rows = Descriptions::new(source, source_island, &ends(|l| l.source));
         let target_rows = Descriptions::new(target, target_island, &ends(|l| l.target));
@@ -107,6 +116,27 @@ pub fn blends(source: &Described<'_>, target: &Described<'_>, landmarks: &[Landm
         }
     }
     blends
+}
+
+/// The first `kept` landmarks, then always the one that is farthest from those chosen, [`MOST`] in all.
+fn spread(landmarks: Vec<Landmark>, kept: usize, embedding: &BiharmonicEmbedding) -> Vec<Landmark> {
+    let count = MOST.max(kept);
+    if landmarks.len() <= count {
+        return landmarks;
+    }
+    let mut gaps = vec![f64::INFINITY; landmarks.len()];
+    let (mut chosen, mut next) = (Vec::with_capacity(count), 0);
+    while chosen.len() < count {
+        let place = landmarks[next].target as usize;
+        chosen.push(landmarks[next]);
+        for (gap, other) in gaps.iter_mut().zip(&landmarks) {
+            *gap = gap.min(embedding.distance(place, other.target as usize));
+        }
+        // Of equal gaps the first, for any number of threads.
+        let farthest = (0..gaps.len()).rev().max_by(|&a, &b| gaps[a].total_cmp(&gaps[b])).expect("there are landmarks");
+        next = if chosen.len() < kept { chosen.len() } else { farthest };
+    }
+    chosen
 }
 
 /// Islands of the target and the island of the source that most of their landmarks are on, where those are enough.
@@ -143,7 +173,7 @@ struct Descriptions {
 }
 
 impl Descriptions {
-    /// Distances to `landmarks`, divided by the largest, and the normal.
+    /// Logarithms of the distances to `landmarks`, divided by the largest, and the normal.
     fn new(side: &Described<'_>, island: u32, landmarks: &[u32]) -> Self {
         let vertices: Vec<u32> =
             (0..side.islands.len() as u32).filter(|&i| side.islands[i as usize] == island).collect();
@@ -152,7 +182,7 @@ impl Descriptions {
                 landmarks.iter().map(|&j| side.embedding.distance(i as usize, j as usize)).collect();
             let largest = distances.iter().fold(0.0f64, |most, &x| most.max(x)).max(f64::MIN_POSITIVE);
             let normal = side.normals[i as usize].to_array().map(|x| (ORIENTATION * f64::from(x)) as f32);
-            distances.into_iter().map(move |d| (d / largest) as f32).chain(normal).collect::<Vec<f32>>()
+            distances.into_iter().map(move |d| (d / largest + BESIDE).ln() as f32).chain(normal).collect::<Vec<f32>>()
         };
         let values = vertices.par_iter().flat_map_iter(row).collect();
         Self { vertices, width: landmarks.len() + 3, values }
@@ -181,7 +211,7 @@ impl Descriptions {
     fn nearest(&self, wanted: &[f32], candidates: &[&[u32]]) -> Blend {
         let mut best = [(f32::INFINITY, u32::MAX); BEST];
         let mut consider = |k: u32| {
-            let squared: f32 = self.row(k as usize).iter().zip(wanted).map(|(x, y)| (x - y) * (x - y)).sum();
+            let squared = squared_difference(self.row(k as usize), wanted, best[BEST - 1].0);
             if squared < best[BEST - 1].0 && best.iter().all(|b| b.1 != k) {
                 best[BEST - 1] = (squared, k);
                 best.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -196,4 +226,16 @@ impl Descriptions {
         let total: f64 = best.iter().map(|b| share(b.0)).sum();
         best.map(|(squared, k)| (self.vertices.get(k as usize).copied().unwrap_or(u32::MAX), share(squared) / total))
     }
+}
+
+/// The sum of squared differences, or as much of it as shows that it is not less than `limit`.
+fn squared_difference(a: &[f32], b: &[f32], limit: f32) -> f32 {
+    let mut sum = 0.0;
+    for (a, b) in a.chunks(8).zip(b.chunks(8)) {
+        sum += a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>();
+        if sum >= limit {
+            break;
+        }
+    }
+    sum
 }

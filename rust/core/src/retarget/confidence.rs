@@ -1,7 +1,7 @@
 //! How far a match is to be believed.
 
 use super::Settings;
-use super::prepared::Placed;
+use super::placed::Placed;
 use crate::welded::Welded;
 
 /// Confidence at which a match counts as reliable.
@@ -12,10 +12,9 @@ pub(super) const RELIABLE: f64 = 0.5;
 /// the source's diagonal.
 pub(super) fn of_matches(placed: &Placed, target: &Welded, size: f64, settings: &Settings) -> Vec<f64> {
     let stretch = stretches(placed, target);
-    let distance = |u: usize| placed.matches[u].position.distance(placed.positions[u]);
     let of_one = |u: usize| {
         let angle = placed.matches[u].cosine.clamp(-1.0, 1.0).acos();
-        falling(distance(u), settings.max_distance * size)
+        falling(placed.gaps[u], settings.max_distance * size)
             .min(falling(angle, settings.max_normal_angle))
             .min(falling(stretch[u], settings.max_stretch))
     };

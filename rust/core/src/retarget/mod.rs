@@ -1,7 +1,7 @@
 //! Weights of one character for another with a matching skeleton.
 //!
 //! The way: `skeleton` reads both skeletons and the map between them; `warp` brings the target into the source's rest pose and
-//! proportions, `registration` draws it onto the source; `matching` finds the source point of each vertex, or `biharmonic` a
+//! proportions, `placed` draws it onto the source; `matching` finds the source point of each vertex, or `biharmonic` a
 //! blend of source vertices; `shares` turns the source's bones into the target's; `confidence` says which matches to
 //! believe, and the others are filled from around them; then smoothing and the limit.
 
@@ -9,6 +9,7 @@ mod alignment;
 mod biharmonic;
 mod confidence;
 mod finish;
+mod placed;
 mod prepared;
 mod rows;
 mod settings;
@@ -81,6 +82,8 @@ pub struct Report {
     pub inherited: Vec<(u32, u32)>,
     /// Bones of the target without a partner.
     pub without_partner: Vec<u32>,
+    /// Whether vertices were matched by their numbers, as both meshes are one in two shapes.
+    pub by_number: bool,
     /// Landmarks in force, those of the bones included.
     pub landmarks: usize,
     /// Vertices matched by biharmonic distances; the others by the skeleton.
@@ -131,12 +134,12 @@ pub fn retarget(
     let mut stages = Stages { start: Instant::now(), seconds: Vec::new() };
     let prepared = Prepared::new(source, weights, target, correspondence, settings)?;
     stages.end("prepare");
-    let placed = prepared.place(progress)?;
+    let mut placed = prepared.place(progress)?;
     stages.end("match");
     let mut rows = prepared.rows_of(&placed.matches);
-    let mut report = prepared.report();
+    let mut report = Report { by_number: placed.by_number, ..prepared.report() };
     if settings.method == Method::Biharmonic {
-        (report.landmarks, report.by_landmarks) = prepared.replace_by_landmarks(&placed, &mut rows, progress)?;
+        (report.landmarks, report.by_landmarks) = prepared.replace_by_landmarks(&mut placed, &mut rows, progress)?;
         stages.end("landmarks");
     }
     let confidence = confidence::of_matches(&placed, &prepared.target, prepared.size, settings);

@@ -1,8 +1,9 @@
 //! Both characters checked and welded, and the steps that need both.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::biharmonic::{Described, blends, check_landmarks, landmarks_of_matches};
+use super::biharmonic::{Blend, Described, blends, check_landmarks, landmarks_of_matches};
+use super::placed::Placed;
 use super::rows::{Row, blended};
 use super::shares::Shares;
 use super::skeleton::{Guide, RestBone, guides, pairs};
@@ -12,44 +13,26 @@ use crate::adjacency::Islands;
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::registration::{Lengths, Match, Matching};
-use crate::registration::{Schedule, register};
+use crate::registration::Match;
 use crate::weights::Weights;
 use crate::welded::Welded;
-
-/// Length over which normals are smoothed, as a share of the source's diagonal.
-const NORMAL_SMOOTHING: f64 = 0.02;
-/// The rounds of the optional registration.
-const ROUNDS: Schedule<'static> = Schedule { lengths: &[0.15, 0.1, 0.075, 0.05, 0.035, 0.025, 0.015], trusted: 0.04 };
-/// How far vertices follow the weights of their first match.
-const FOLLOW: f64 = 0.4;
 
 /// Everything that is known before the first vertex is matched.
 #[derive(Debug)]
 pub(super) struct Prepared<'a> {
-    characters: [Character<'a>; 2],
+    pub characters: [Character<'a>; 2],
     weights: &'a Weights,
     correspondence: Correspondence<'a>,
-    settings: &'a Settings,
+    pub settings: &'a Settings,
     /// Pairs whose source bone holds weight: they guide the warp.
-    guides: Vec<Guide>,
+    pub guides: Vec<Guide>,
     shares: Shares<'a>,
-    warp: Warp,
-    source: Welded,
+    pub warp: Warp,
+    pub source: Welded,
     /// The target's distinct positions.
     pub target: Welded,
     /// Diagonal of the source.
     pub size: f64,
-}
-
-/// The target in the source's pose, and the match of each of its distinct positions (U).
-#[derive(Debug)]
-pub(super) struct Placed {
-    pub positions: Vec<DVec3>,
-    /// Smooth normals of both sides, in the source's pose.
-    pub normals: Vec<Vec3>,
-    pub source_normals: Vec<Vec3>,
-    pub matches: Vec<Match>,
 }
 
 impl<'a> Prepared<'a> {
@@ -101,43 +84,6 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Warps, registers and matches the target.
-    pub fn place(&self, progress: &Progress) -> Result<Placed> {
-        let triangles = self.characters[0].mesh.triangles();
-        let points = self.settings.match_points;
-        let lengths =
-            Lengths { normal: self.settings.normal_length * self.size, smoothing: NORMAL_SMOOTHING * self.size };
-        let mut positions = self.warp.apply(&self.target.positions);
-        let matching = Matching::new(&self.source, triangles, &self.target, &positions, points, lengths)?;
-        progress.report(0.05);
-        progress.check()?;
-        self.follow_weights(&matching, &mut positions)?;
-        progress.report(0.1);
-        progress.check()?;
-        if self.settings.registration {
-            let (triangles, watch) = (&self.target.triangles, (progress, (0.1, 0.7)));
-            positions = register(&matching, triangles, positions, self.size, ROUNDS, watch)?;
-        }
-        let (matches, normals) = matching.closest(&positions)?;
-        progress.report(0.7);
-        progress.check()?;
-        let source_normals = matching.source_normals().to_vec();
-        Ok(Placed { positions, normals, source_normals, matches })
-    }
-
-    /// Moves each vertex part of the way to where the weights of its match would carry it: the nearest bones change abruptly between
-    /// limbs, painted weights do not.
-    fn follow_weights(&self, matching: &Matching<'_>, positions: &mut [DVec3]) -> Result<()> {
-        let rows: Vec<Row> = self.rows_of(&matching.closest(positions)?.0);
-        let mut guide_of = vec![None; self.characters[1].skeleton.bones().len()];
-        for (k, guide) in self.guides.iter().enumerate() {
-            guide.targets.iter().for_each(|&t| guide_of[t as usize] = Some(k));
-        }
-        let carried = self.warp.apply_weighted(&self.target.positions, &rows, &guide_of);
-        positions.iter_mut().zip(carried).for_each(|(position, carried)| *position = position.lerp(carried, FOLLOW));
-        Ok(())
-    }
-
     /// The weights of each match over the target's bones (U).
     pub fn rows_of(&self, matches: &[Match]) -> Vec<Row> {
         let corners = matches.iter().map(|at| std::iter::zip(at.corners, at.barycentric));
@@ -145,11 +91,11 @@ impl<'a> Prepared<'a> {
         corners.zip(&self.target.positions).map(row).collect()
     }
 
-    /// Replaces rows (U) of islands with landmarks by those of the biharmonic matching. Returns the numbers of landmarks and
-    /// of vertices concerned.
+    /// Replaces matches and rows (U) of islands with landmarks by those of the biharmonic matching. Returns the numbers of
+    /// landmarks and of vertices concerned.
     pub fn replace_by_landmarks(
         &self,
-        placed: &Placed,
+        placed: &mut Placed,
         rows: &mut [Row],
         progress: &Progress,
     ) -> Result<(usize, usize)> {
@@ -176,17 +122,33 @@ impl<'a> Prepared<'a> {
                 regions: &regions[1],
             },
             &landmarks,
+            self.correspondence.landmarks.len(),
         );
         progress.check()?;
         let mut count = 0;
         for (blend, &u) in std::iter::zip(blends, &self.target.of_vertex) {
             if let Some(blend) = blend {
                 let position = self.target.positions[u as usize];
+                self.rematch(placed, u as usize, &blend);
                 rows[u as usize] = blended(blend.into_iter(), self.weights, &self.shares, position);
                 count += 1;
             }
         }
         Ok((landmarks.len(), count))
+    }
+
+    /// Moves the match of a distinct position of the target to a blend of source vertices. How far the skeleton would have
+    /// put it from there says nothing.
+    fn rematch(&self, placed: &mut Placed, u: usize, blend: &Blend) {
+        let (mut position, mut normal) = (DVec3::ZERO, DVec3::ZERO);
+        for &(vertex, share) in blend.iter().filter(|(_, share)| *share > 0.0) {
+            let at = self.source.of_vertex[vertex as usize] as usize;
+            position += share * self.source.positions[at];
+            normal += share * placed.source_normals[at].as_dvec3();
+        }
+        let cosine = normal.normalize_or_zero().dot(placed.normals[u].as_dvec3());
+        placed.matches[u] = Match { position, cosine, ..placed.matches[u] };
+        placed.gaps[u] = 0.0;
     }
 
     /// Those of the artist, and one beside the head of each bone that guides.

@@ -26,8 +26,10 @@ pub struct Settings {
     pub method: Method,
     /// What a match may be.
     pub match_points: MatchPoints,
-    /// Whether the warped target is drawn onto the source by smooth displacements: for bodies of one maker with other
-    /// proportions, whose surfaces correspond. Where weights follow the bones more than the surface, it costs accuracy.
+    /// Whether vertices are matched by their numbers where both meshes have the same triangles and these lie at about the
+    /// same places: bodies that are shapes of one base mesh.
+    pub vertex_order: bool,
+    /// Whether the warped target is drawn onto the source by smooth displacements, as far as its bones are long.
     pub registration: bool,
     /// How far apart normals that differ by a unit count, relative.
     pub normal_length: f64,
@@ -52,7 +54,8 @@ impl Default for Settings {
         Self {
             method: Method::default(),
             match_points: MatchPoints::default(),
-            registration: false,
+            vertex_order: true,
+            registration: true,
             normal_length: 0.02,
             max_distance: 0.08,
             max_normal_angle: 80f64.to_radians(),
