@@ -10,10 +10,11 @@ import oracle
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-DIRECTION, HYSTERESIS, TIE = 0.015, 0.8, 0.15
-SLACK = 1 + 12 * TIE**2
-EQUALLY_NEAR, FLOOR, TILT, LEAST_COSINE, HELD = 1e-6, 1e-3, 3.0, 0.05, 0.25
-KEPT, STRETCH, DETAIL_TILT, DETAIL_GAP = 0.85, 0.5, 4, 0.05
+DIRECTION, HYSTERESIS, TIE = 0.015, 0.8, 0.3
+SLACK = 1 + 8 * TIE**2
+EQUALLY_NEAR, FLOOR, GAP, TILT, LEAST_COSINE, HELD = 1e-6, 1e-3, 0.93, 2.8, 0.05, 0.25
+KEPT, STRETCH, DETAIL_TILT, DETAIL_GAP, STEEP = 0.85, 0.5, 4, 0.05, 25.0
+REACH = 1.5
 
 
 @dataclass
@@ -78,12 +79,15 @@ def trusted(source: tuple, target: tuple) -> Trusted:
     corners, body_normals = positions[triangles], source_normals(positions, triangles)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     normals = unit(oracle.vertex_normals(points, faces))
+    sides = unit(np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]))
+    around = [sides[(faces == i).any(axis=1)] for i in range(len(points))]
     found = Trusted(np.zeros((len(points), dense.shape[1])), *(np.zeros(len(points)) for _ in range(2)), points.copy())
     for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
         shares = closest_on_triangles(point, corners)
         on = np.einsum("tk,tki->ti", shares, corners)
         distance = np.linalg.norm(on - point, axis=1)
-        cosine = unit(np.einsum("tk,tki->ti", shares, body_normals[triangles])) @ normal
+        body_normal = unit(np.einsum("tk,tki->ti", shares, body_normals[triangles]))
+        cosine = body_normal @ normal
         cost = distance**2 + 2 * (DIRECTION * extent) ** 2 * (1 - np.clip(cosine, -1, 1))
         near = distance <= distance.min() + EQUALLY_NEAR * extent
         best_near, best = cost[near].min(), cost.min()
@@ -96,14 +100,16 @@ def trusted(source: tuple, target: tuple) -> Trusted:
         weight /= weight.sum()
         blended = np.einsum("tk,tkb->tb", shares[tied], dense[triangles[tied]])
         found.rows[i] = weight @ (blended / blended.sum(axis=1, keepdims=True))
-        found.gap[i], found.cosine[i] = weight @ distance[tied], weight @ cosine[tied]
+        # Creases and hems: of the directions around the vertex, the one that agrees best.
+        agreement = np.abs(body_normal[tied] @ np.vstack([normal, around[i]]).T).max(axis=1)
+        found.gap[i], found.cosine[i] = weight @ distance[tied], weight @ agreement
         found.point[i] = weight @ on[tied]
     return found
 
 
 def lengths(found: Trusted, extent: float, softness: float = 0.7) -> np.ndarray:
     tangent = 1 / np.maximum(np.abs(found.cosine), LEAST_COSINE) ** 2 - 1
-    growth = found.gap * (1 + TILT * tangent)
+    growth = found.gap * (GAP + TILT * tangent)
     return softness * growth + np.minimum(FLOOR * extent, found.gap / 2) + EQUALLY_NEAR * extent
 
 
@@ -113,7 +119,9 @@ def edge_trust(found: Trusted, edges: np.ndarray, lengths: np.ndarray, extent: f
     stretch = np.linalg.norm(found.point[a] - found.point[b], axis=1) / lengths
     gap = np.maximum(found.gap[a], found.gap[b]) / (DETAIL_GAP * extent)
     cosine = np.minimum(np.abs(found.cosine[a]), np.abs(found.cosine[b]))
-    return KEPT * cosine**DETAIL_TILT / ((1 + (np.maximum(stretch - 1, 0) / STRETCH) ** 2) * (1 + gap**4))
+    steepness = 0.5 * np.abs(found.rows[a] - found.rows[b]).sum(axis=1) * extent / lengths
+    steep = 1 + (steepness / STEEP) ** 2
+    return KEPT / steep * cosine**DETAIL_TILT / ((1 + (np.maximum(stretch - 1, 0) / STRETCH) ** 2) * (1 + gap**4))
 
 
 def transfer(source: tuple, target: tuple, softness: float = 0.7) -> np.ndarray:
@@ -126,15 +134,27 @@ def transfer(source: tuple, target: tuple, softness: float = 0.7) -> np.ndarray:
     long = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
     shortest = np.full(len(positions), np.inf)
     np.minimum.at(shortest, edges, long[:, None])
-    confidence = 4 * mass / h**2
+    confidence = REACH * mass / h**2
     scaled = -np.asarray(S[edges[:, 0], edges[:, 1]]).ravel() * edge_trust(found, edges, long, extent)
     across = sp.coo_matrix((scaled, edges.T), S.shape)
     guided = (sp.diags(np.asarray((across + across.T).sum(axis=1)).ravel()) - across - across.T) @ found.rows
     free, held = np.flatnonzero(h >= HELD * shortest), np.flatnonzero(h < HELD * shortest)
     X = found.rows.copy()
     if len(free):
-        factor = splu((S[np.ix_(free, free)] + sp.diags(confidence[free])).tocsc())
-        for _ in range(2):
-            right = confidence[:, None] * X + guided
-            X[free] = factor.solve(right[free] - S[np.ix_(free, held)] @ found.rows[held])
+        S = S.tocsr()
+        X[free] = corrected(S, mass, confidence, h, found.rows, guided, free, held)
     return X
+
+
+def corrected(S, mass, confidence, h, rows, guided, free, held):
+    """Two harmonic passes, and one step towards `S M^-1 S W + M h^-4 W = M h^-4 rows + S M^-1 guided` from there,
+    preconditioned by the passes."""
+    factor = splu((S[np.ix_(free, free)] + sp.diags(confidence[free])).tocsc())
+    X = rows.copy()
+    for _ in range(2):
+        right = confidence[:, None] * X + guided
+        X[free] = factor.solve(right[free] - S[np.ix_(free, held)] @ rows[held])
+    bent = (S @ X - guided) / mass[:, None]
+    bent[held] = 0
+    defect = (mass / h**4)[:, None] * (rows - X) - S @ bent
+    return X[free] + factor.solve(mass[free, None] * factor.solve(defect[free]))

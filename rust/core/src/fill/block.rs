@@ -1,10 +1,12 @@
 //! One independent block of unknowns: assembled, factored, solved for any number of columns.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SymmetricMatrix};
 
 use super::constraint::Known;
-use super::rows::{GivenRows, KnownRows, Row};
+use super::rows::{KnownRows, Ragged, Row};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -57,10 +59,12 @@ fn soft_unknowns(known: &Known, unknowns: &[u32]) -> impl Iterator<Item = (u32, 
 pub struct Block {
     unknowns: Vec<u32>,
     /// Places of the soft unknowns and their confidences.
-    soft: Vec<(u32, f64)>,
+    pub(super) soft: Vec<(u32, f64)>,
     length: f64,
-    boundary: Boundary,
-    factor: Cholesky,
+    pub(super) boundary: Boundary,
+    pub(super) factor: Cholesky,
+    /// Backward error of a solve whose answer is 1 everywhere, once somebody asked.
+    accuracy: OnceLock<f64>,
 }
 
 /// Rows of a block's unknowns.
@@ -76,17 +80,30 @@ enum Values<'b> {
     /// no energy.
     Constant(f64),
     Solved(Solution<'b>),
+    /// Columns and values of each unknown, and the backward error of the factor.
+    Sparse(Ragged<(u32, f64)>, f64),
 }
 
 impl BlockRows<'_> {
+    /// Only these columns and values of each unknown, others being negligible; `residual` is the factor's backward error.
+    pub(super) fn sparse(rows: Ragged<(u32, f64)>, residual: f64) -> Self {
+        Self { columns: Vec::new(), values: Values::Sparse(rows, residual) }
+    }
+
+    /// One column with one value for all unknowns.
+    pub(super) fn constant(column: u32, value: f64) -> Self {
+        Self { columns: vec![column], values: Values::Constant(value) }
+    }
+
     /// Columns and values of the block's unknown `k`, by column.
     pub fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let (constant, solution) = match &self.values {
-            Values::Constant(value) => (Some(*value), None),
-            Values::Solved(solution) => (None, Some(solution)),
+        let (constant, solution, sparse) = match &self.values {
+            Values::Constant(value) => (Some(*value), None, [].as_slice()),
+            Values::Solved(solution) => (None, Some(solution), [].as_slice()),
+            Values::Sparse(rows, _) => (None, None, rows.of(k)),
         };
         let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
-        std::iter::zip(self.columns.iter().copied(), values)
+        std::iter::zip(self.columns.iter().copied(), values).chain(sparse.iter().copied())
     }
 
     /// Backward error of the solve.
@@ -94,6 +111,7 @@ impl BlockRows<'_> {
         match &self.values {
             Values::Constant(_) => 0.0,
             Values::Solved(solution) => solution.residual(),
+            Values::Sparse(_, residual) => *residual,
         }
     }
 }
@@ -110,7 +128,7 @@ impl Block {
             Failure::NotPositive(failed) => Error::NotPositiveDefinite { vertex: unknowns[failed.unknown] as usize },
             Failure::Stopped => Error::Cancelled,
         })?;
-        Ok(Self { unknowns, soft, length, boundary, factor })
+        Ok(Self { unknowns, soft, length, boundary, factor, accuracy: OnceLock::new() })
     }
 
     /// The block's vertices, ascending.
@@ -139,7 +157,7 @@ impl Block {
         if let Some([(column, value)]) = rows().next().map(Vec::as_slice)
             && rows().all(|row| row[..] == [(*column, *value)])
         {
-            return Ok(BlockRows { columns, values: Values::Constant(*value) });
+            return Ok(BlockRows::constant(*column, *value));
         }
         let places = Places::of(&columns);
         let own = |s: usize, row: &mut [f64]| places.add(row, &soft[s], self.soft[s].1);
@@ -147,45 +165,31 @@ impl Block {
         Ok(BlockRows { columns, values: Values::Solved(solution) })
     }
 
-    /// Rows of the unknowns solved for twice: soft ones are pulled towards their rows first and towards the answer then, both
-    /// times with the rows of `added` on top.
+    /// Backward error of a solve whose answer is 1 everywhere.
     ///
     /// # Errors
-    /// Those of [`Block::solve`].
-    pub(super) fn solve_twice(&self, known: KnownRows<'_>, added: GivenRows<'_>) -> Result<BlockRows<'_>> {
-        let fixed: Vec<Row> = self.boundary.vertices.par_iter().map(|&i| known.row(i)).collect();
-        let with_added = |&(k, _): &(u32, f64)| {
-            let (i, mut added_row) = (self.unknowns[k as usize], Row::new());
-            added(i, &mut added_row);
-            (known.row(i), added_row)
+    /// [`Error::NotPositiveDefinite`] if it stays above 1e-8.
+    pub(super) fn accuracy(&self) -> Result<f64> {
+        let measure = || {
+            let mut ones: Vec<f64> = vec![0.0; self.unknowns.len()];
+            self.soft.iter().for_each(|&(k, confidence)| ones[k as usize] = confidence);
+            for (one, range) in std::iter::zip(&mut ones, self.boundary.starts.windows(2)) {
+                *one -= self.boundary.values[range[0]..range[1]].iter().sum::<f64>();
+            }
+            self.factor.solve(&RightHandSides::dense(ones.len(), 1, ones)).residual()
         };
-        let (soft, added): (Vec<Row>, Vec<Row>) = self.soft.par_iter().map(with_added).unzip();
-        let mut columns: Vec<u32> =
-            fixed.iter().chain(&soft).chain(&added).flatten().map(|&(column, _)| column).collect();
-        columns.par_sort_unstable();
-        columns.dedup();
-        let places = Places::of(&columns);
-        let own = |s: usize, row: &mut [f64]| {
-            places.add(row, &soft[s], self.soft[s].1);
-            places.add(row, &added[s], self.soft[s].1);
-        };
-        let first = self.checked(&self.right_hand_sides(&fixed, &places, own))?;
-        let again = |s: usize, row: &mut [f64]| {
-            let (k, confidence) = self.soft[s];
-            std::iter::zip(&mut *row, first.row(k as usize)).for_each(|(sum, value)| *sum += confidence * value);
-            places.add(row, &added[s], confidence);
-        };
-        let right_hand_sides = self.right_hand_sides(&fixed, &places, again);
-        drop(first);
-        Ok(BlockRows { values: Values::Solved(self.checked(&right_hand_sides)?), columns })
+        let accuracy = *self.accuracy.get_or_init(measure);
+        self.is_accurate(accuracy).map(|()| accuracy)
+    }
+
+    fn is_accurate(&self, residual: f64) -> Result<()> {
+        let accurate = residual <= REFUSE_ABOVE;
+        accurate.then_some(()).ok_or(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize })
     }
 
     fn checked(&self, right_hand_sides: &RightHandSides) -> Result<Solution<'_>> {
         let solution = self.factor.solve(right_hand_sides);
-        if solution.residual().is_nan() || solution.residual() > REFUSE_ABOVE {
-            return Err(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize });
-        }
-        Ok(solution)
+        self.is_accurate(solution.residual()).map(|()| solution)
     }
 
     /// `diag(b) W_0 - Q_UI W_I`, (unknowns, columns); `add_soft` adds the first term for soft unknown s to a row.
@@ -215,14 +219,14 @@ impl Block {
 }
 
 /// Where each column of a block stands among its columns.
-struct Places {
-    of_column: Vec<u32>,
+pub(super) struct Places {
+    pub of_column: Vec<u32>,
     count: usize,
 }
 
 impl Places {
     /// Of `columns`, ascending.
-    fn of(columns: &[u32]) -> Self {
+    pub fn of(columns: &[u32]) -> Self {
         let mut of_column = vec![0; columns.last().map_or(0, |&column| column as usize + 1)];
         std::iter::zip(0.., columns).for_each(|(k, &column)| of_column[column as usize] = k);
         Self { of_column, count: columns.len() }

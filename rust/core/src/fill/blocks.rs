@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::block::{Block, BlockRows, System};
 use super::constraint::Known;
-use super::rows::{GivenRows, KnownRows};
+use super::rows::KnownRows;
+use super::screened::{self, Given};
 use super::system::{independent_blocks, number_unknowns};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -75,13 +76,9 @@ impl Blocks {
         self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve(known))).collect()
     }
 
-    /// Solves all blocks twice, see [`Block::solve_twice`].
-    pub(super) fn solve_twice(
-        &self,
-        known: KnownRows<'_>,
-        added: GivenRows<'_>,
-        progress: &Progress,
-    ) -> Result<Vec<BlockRows<'_>>> {
-        self.0.par_iter().map(|block| progress.check().and_then(|()| block.solve_twice(known, added))).collect()
+    /// Solves all blocks with lengths of trust, see [`screened`].
+    pub(super) fn solve_screened(&self, given: Given<'_>, progress: &Progress) -> Result<Vec<BlockRows<'_>>> {
+        let solve = |block| progress.check().and_then(|()| screened::solve(block, given, progress));
+        self.0.par_iter().map(solve).collect()
     }
 }

@@ -15,11 +15,13 @@ mod blocks;
 mod constraint;
 mod filled;
 mod rows;
+pub mod screened;
 mod system;
 
 pub use constraint::Constraint;
 pub use filled::Filled;
-pub use rows::{GivenRows, Row};
+pub use rows::{GivenRows, Ragged, Row};
+pub use screened::RowTable;
 
 use std::borrow::Cow;
 
@@ -264,20 +266,42 @@ impl Fill {
         Ok(Filled::new(known, self.blocks.as_slice(), rows))
     }
 
-    /// Solves the problem posed last twice with one factor: soft rows are pulled towards the `given` ones first and towards
-    /// that answer then. With l = 0 this is as smooth as l > 0 makes it, at the price of a much smaller factor. Both times
-    /// the rows of `added`, by vertex of the mesh that is solved on, come on top of what soft rows are pulled to.
+    /// The `given` rows as the mesh that is solved on sees them, for [`Self::solve_screened`].
+    pub fn row_table(&self, given: GivenRows<'_>) -> RowTable {
+        let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
+        RowTable::new(self.known.constraints.len(), |i, row| {
+            if self.known.constraints[i].is_known() {
+                known.append(i as u32, row);
+            }
+        })
+    }
+
+    /// Solves the problem posed last, with l = 0 and confidences from [`screened::confidence`], such that every soft row is
+    /// trusted over its length. `rows` is the [table](Self::row_table) of the `given` ones. `kept` is the share of the change
+    /// of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's rows.
     ///
     /// # Errors
     /// Those of [`Fill::solve`].
-    pub fn solve_twice<'a>(
+    pub fn solve_screened<'a>(
         &'a self,
         given: GivenRows<'a>,
-        added: GivenRows<'_>,
+        rows: &RowTable,
+        kept: &Ragged<f64>,
         progress: &Progress,
     ) -> Result<Filled<'a>> {
+        let number = number_block_unknowns(self.blocks.as_slice(), self.known.unknown.len());
+        let all = screened::Given { laplacian: &self.laplacian, rows, kept, number: &number };
+        let found = self.blocks.solve_screened(all, progress)?;
         let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
-        let rows = self.blocks.solve_twice(known, added, progress)?;
-        Ok(Filled::new(known, self.blocks.as_slice(), rows))
+        Ok(Filled::new(known, self.blocks.as_slice(), found))
     }
+}
+
+/// Place of every unknown in its block, [`NONE`] for the other vertices, (V).
+fn number_block_unknowns(blocks: &[block::Block], vertex_count: usize) -> Vec<u32> {
+    let mut number = vec![NONE; vertex_count];
+    for block in blocks {
+        std::iter::zip(0.., block.unknowns()).for_each(|(k, &i)| number[i as usize] = k);
+    }
+    number
 }

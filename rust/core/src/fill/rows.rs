@@ -1,7 +1,50 @@
 //! The rows that are given, and those of vertices that are one.
 
+use rayon::prelude::*;
+
 use super::constraint::{Constraint, Known};
 use crate::weld::Weld;
+
+/// Lists of many vertices in one piece of memory.
+#[derive(Debug, Clone)]
+pub struct Ragged<T> {
+    /// Where each list starts, (V+1).
+    starts: Vec<usize>,
+    values: Vec<T>,
+}
+
+/// Lists a worker makes at a time.
+const LISTS_A_RUN: usize = 2048;
+
+impl<T: Copy + Send + Sync> Ragged<T> {
+    /// `append(i, out)` appends the list of each of `count` vertices to `out`, on several threads.
+    pub fn new(count: usize, append: impl Fn(usize, &mut Vec<T>) + Sync) -> Self {
+        let run = |first: usize| {
+            let (mut ends, mut values) = (Vec::with_capacity(LISTS_A_RUN), Vec::new());
+            for i in first..(first + LISTS_A_RUN).min(count) {
+                append(i, &mut values);
+                ends.push(values.len());
+            }
+            (ends, values)
+        };
+        let runs = (0..count.div_ceil(LISTS_A_RUN)).into_par_iter().map(|k| run(k * LISTS_A_RUN));
+        let runs: Vec<(Vec<usize>, Vec<T>)> = runs.collect();
+        let mut all = Self { starts: Vec::with_capacity(count + 1), values: Vec::new() };
+        all.values.reserve_exact(runs.iter().map(|(_, values)| values.len()).sum());
+        all.starts.push(0);
+        for (ends, values) in runs {
+            let offset = all.values.len();
+            all.starts.extend(ends.iter().map(|end| offset + end));
+            all.values.extend_from_slice(&values);
+        }
+        all
+    }
+
+    /// The list of vertex `i`.
+    pub fn of(&self, i: usize) -> &[T] {
+        &self.values[self.starts[i]..self.starts[i + 1]]
+    }
+}
 
 /// Columns and values of one vertex, by column.
 pub type Row = Vec<(u32, f64)>;

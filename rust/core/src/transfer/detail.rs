@@ -1,18 +1,16 @@
 //! Detail of the source's weights that a garment keeps even where it is smoothed.
 //!
-//! Smoothing over the width of a gap would blur the sharp changes at elbows and knees as well. Where two neighbours' points lie
-//! on the source as the neighbours themselves lie to each other, the change of weight between them is the source's own and is
-//! kept; where the points lie apart, as on two legs, or the surfaces tilt, the change is an accident of matching and is not.
-//! With t the trust in an edge and `S_t` the stiffness whose edges are scaled by it, what is solved is
-//! `S W + b (W - W0) = S_t W0`: gradient-domain blending (Pérez, Gangnet, Blake, *Poisson Image Editing*, SIGGRAPH 2003,
-//! doi 10.1145/882262.882269) with the source's weights as guidance.
+//! Smoothing over the width of a gap would blur the changes at elbows and knees as well. Where two neighbours' points lie on the
+//! source as the neighbours themselves lie to each other, the change of weight between them is the source's own and is kept;
+//! where the points lie apart, as on two legs, or the surfaces tilt, or the change is so steep that the cloth would tear there,
+//! it is an accident of matching and is not.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Source;
 use super::matching::Matches;
-use crate::fill::{Constraint, Fill, Row};
+use crate::fill::{Constraint, Fill, Ragged, RowTable};
 
 /// Share of a trusted change that is kept at most; all of it would keep more torn edges as well.
 const KEPT: f64 = 0.85;
@@ -22,6 +20,8 @@ const STRETCH: f64 = 0.5;
 const TILT: i32 = 4;
 /// Gap, as a share of the source's size, at which it is trusted by half.
 const GAP: f64 = 0.05;
+/// Change of weight over the source's size at which it is trusted by half: a bend of a limb tears edges that are steeper.
+const STEEP: f64 = 25.0;
 
 /// What a vertex's point says of the edges around it.
 struct Place {
@@ -41,100 +41,40 @@ impl Place {
     }
 }
 
-/// The source's rows, and what is added to those of soft vertices so that detail is kept: `S_t W0 / b`.
-#[derive(Debug)]
-pub(super) struct Detail {
-    own: Vec<Row>,
-    added: Vec<Row>,
-}
-
-impl Detail {
-    /// `rows` appends the source's row of a vertex, `constraints` (V) say which are known and which are soft.
-    pub fn new(
-        source: &Source,
-        matches: &Matches,
-        fill: &Fill,
-        constraints: &[Constraint],
-        rows: impl Fn(u32, &mut Row) + Sync,
-    ) -> Self {
-        let own = |i: usize| {
-            let mut row = Row::new();
-            if constraints[i].is_known() {
-                rows(i as u32, &mut row);
-            }
-            row
-        };
-        let own: Vec<Row> = (0..constraints.len()).into_par_iter().with_min_len(256).map(own).collect();
-        let added = guidance(source, matches, fill, constraints, &own);
-        Self { own, added }
-    }
-
-    /// The source's row of vertex `i`, empty where it is not asked for.
-    pub fn own(&self, i: u32) -> &Row {
-        &self.own[i as usize]
-    }
-
-    /// What is added to it.
-    pub fn added(&self, i: u32) -> &Row {
-        &self.added[i as usize]
-    }
-}
-
-/// `S_t W0 / b`, a row for each soft vertex; edges to vertices without a row count for nothing.
-fn guidance(source: &Source, matches: &Matches, fill: &Fill, constraints: &[Constraint], own: &[Row]) -> Vec<Row> {
+/// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V). `rows` are the source's, empty
+/// where none is asked for; only soft vertices keep anything.
+pub(super) fn kept(
+    source: &Source,
+    matches: &Matches,
+    fill: &Fill,
+    constraints: &[Constraint],
+    rows: &RowTable,
+) -> Ragged<f64> {
     let place = |i: usize| {
         let (point, (gap, cosine)) = (matches.mean_position(source, i), matches.gap_and_cosine(i));
-        Place { point, gap, cosine: cosine.abs() }
+        Place { point, gap, cosine }
     };
-    let places: Vec<Place> = (0..own.len()).into_par_iter().with_min_len(512).map(place).collect();
+    let places: Vec<Place> = (0..constraints.len()).into_par_iter().with_min_len(512).map(place).collect();
     let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
-    let row = |sum: &mut RowSum, i: usize| {
-        let Constraint::Soft(confidence) = constraints[i] else { return Row::new() };
-        for (&j, &cotangent) in std::iter::zip(laplacian.row(i).0, laplacian.row(i).1) {
-            let (here, there) = (&own[i], &own[j as usize]);
-            if here == there || here.is_empty() || there.is_empty() {
-                continue;
-            }
-            let length = mesh.position(i as u32).distance(mesh.position(j));
-            let weight = cotangent * places[i].trust(&places[j as usize], length, source.size()) / confidence;
-            sum.add(here, weight);
-            sum.add(there, -weight);
-        }
-        sum.take()
-    };
-    let start = || RowSum::new(source.n_bones());
-    (0..own.len()).into_par_iter().with_min_len(256).map_init(start, row).collect()
+    Ragged::new(constraints.len(), |i, shares| {
+        let Constraint::Soft(_) = constraints[i] else { return };
+        let here = mesh.position(i as u32);
+        shares.extend(laplacian.neighbours(i).iter().map(|&j| {
+            let length = here.distance(mesh.position(j));
+            let steepness = half_l1(rows.of(i), rows.of(j as usize)) * source.size() / length.max(f64::MIN_POSITIVE);
+            places[i].trust(&places[j as usize], length, source.size()) / (1.0 + (steepness / STEEP).powi(2))
+        }));
+    })
 }
 
-/// A row under construction, dense, and the columns that it has.
-struct RowSum {
-    values: Vec<f64>,
-    is_used: Vec<bool>,
-    columns: Vec<u32>,
-}
-
-impl RowSum {
-    fn new(n_columns: u32) -> Self {
-        let n = n_columns as usize;
-        Self { values: vec![0.0; n], is_used: vec![false; n], columns: Vec::new() }
+/// Half the L1 distance of two rows that sum to one: what either has more than the other.
+fn half_l1(first: &[(u32, f64)], second: &[(u32, f64)]) -> f64 {
+    let mut second = second.iter().copied().peekable();
+    let mut more = 0.0;
+    for &(column, value) in first {
+        while second.next_if(|&(other, _)| other < column).is_some() {}
+        let shared = second.next_if(|&(other, _)| other == column).map_or(0.0, |(_, value)| value);
+        more += (value - shared).max(0.0);
     }
-
-    fn add(&mut self, row: &Row, factor: f64) {
-        for &(column, value) in row {
-            let k = column as usize;
-            if !std::mem::replace(&mut self.is_used[k], true) {
-                self.columns.push(column);
-            }
-            self.values[k] += factor * value;
-        }
-    }
-
-    /// The row, by column, and an empty one in its place.
-    fn take(&mut self) -> Row {
-        self.columns.sort_unstable();
-        let row =
-            self.columns.iter().map(|&column| (column, std::mem::take(&mut self.values[column as usize]))).collect();
-        self.columns.drain(..).for_each(|column| self.is_used[column as usize] = false);
-        row
-    }
+    more
 }

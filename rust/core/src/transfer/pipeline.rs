@@ -1,11 +1,12 @@
 //! The steps of a transfer: constraints -> fill -> smooth -> islands -> limit.
 
-use super::detail::Detail;
 use super::islands::Scene;
 use super::matching::{DISTANCE_REFERENCE, Terms};
 use super::report::{Report, Stages};
 use super::smooth::{push_normalised, region, smooth};
-use super::{Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, small_islands};
+use super::{
+    Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, detail, small_islands,
+};
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
 use crate::fill::{Constraint, Filled, Row};
@@ -43,7 +44,7 @@ impl Problem {
         }
         let smoothness_length = match settings.method {
             MatchMethod::ClosestPoint => settings.smoothness_length.of(prepared.source.diagonal()),
-            // Solving twice is what makes it smooth.
+            // Solving several times is what makes it smooth.
             MatchMethod::Confidence => 0.0,
         };
         Ok(Self { criteria, smoothness_length, constraints, has_match })
@@ -140,10 +141,11 @@ pub(super) fn filled<T>(
     if matches.method() == MatchMethod::ClosestPoint {
         return Ok(take(&target.fill.solve(&own, progress)?));
     }
-    let detail = Detail::new(source, matches, &target.fill, &problem.constraints, own);
-    let own = |i: u32, row: &mut Row| row.extend(detail.own(i));
-    let added = |i: u32, row: &mut Row| row.extend(detail.added(i));
-    Ok(take(&target.fill.solve_twice(&own, &added, progress)?))
+    let fill = &target.fill;
+    let rows = fill.row_table(&own);
+    let kept = detail::kept(source, matches, fill, &problem.constraints, &rows);
+    let own = |i: u32, row: &mut Row| row.extend(rows.of(i as usize));
+    Ok(take(&fill.solve_screened(&own, &rows, &kept, progress)?))
 }
 
 /// With [`MatchMethod::Confidence`], vertices that the mask says to inpaint are filled in last, by the paper's energy between

@@ -11,7 +11,7 @@ use crate::fronts::factor::factor;
 use crate::fronts::tree::Tree;
 use crate::ordering::dissection::dissect;
 use crate::ordering::graph::Graph;
-use crate::substitute::backward::backward;
+use crate::substitute::backward::{Negligible, backward};
 use crate::substitute::forward::forward;
 use crate::substitute::solution::{Part, RightHandSides, Solution};
 use crate::substitute::substitution::Columns;
@@ -52,15 +52,17 @@ impl Multifrontal {
         Ok(Some(Self { tree, panels, arch }))
     }
 
-    /// Solves for all columns, some at a time.
-    pub(crate) fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {
+    /// Solves for all columns, some at a time. With a `negligible` magnitude, what lies where right-hand sides are zero and
+    /// the solution around is no larger stays zero.
+    pub(crate) fn solve(&self, rhs: &RightHandSides, negligible: Option<f64>) -> Solution<'_> {
         let part = |first: usize| {
             let count = (rhs.columns - first).min(TOGETHER);
             let width = count.next_multiple_of(BLOCK);
             let mut values = Buffer::zeroed(rhs.size() * width);
             let columns = Columns { rhs, first, count, width };
-            forward(&self.tree, &self.panels, self.arch, columns, &mut values);
-            backward(&self.tree, &self.panels, self.arch, width, &mut values);
+            let has_data = forward(&self.tree, &self.panels, self.arch, columns, &mut values);
+            let negligible = negligible.map(|magnitude| Negligible { has_data: &has_data, magnitude });
+            backward(&self.tree, &self.panels, self.arch, width, negligible, &mut values);
             Part { values, width, count }
         };
         let parts = (0..rhs.columns).step_by(TOGETHER).map(part).collect();
@@ -118,12 +120,12 @@ pub(crate) mod tests {
         let (matrix, positions) = chain(1500);
         let rhs = sines(1500, 29);
         let oracle = Supernodal::factor(&matrix).unwrap();
-        let wanted = oracle.solve(&rhs);
+        let wanted = oracle.solve(&rhs, None);
         for arch in instruction_sets() {
             let mut solver = Multifrontal::factor(&matrix, &positions, &crate::NEVER).unwrap().unwrap();
             solver.arch = arch;
             solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch, &crate::NEVER).unwrap();
-            let x = solver.solve(&rhs);
+            let x = solver.solve(&rhs, None);
             let rows = (0..1500).flat_map(|i| x.row(i).zip(wanted.row(i)));
             let worst = rows.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
             assert!(worst < 1e-9, "{arch:?}: {worst:e}");

@@ -1,4 +1,5 @@
-//! Backward substitution, from the root to the leaves. It is dense: every solution is full.
+//! Backward substitution, from the root to the leaves. It is dense, unless the caller says what is negligible: then subtrees
+//! whose right-hand sides are zero and around which the solution has died away are left out.
 
 use pulp::Arch;
 
@@ -14,8 +15,24 @@ const FORK_COLUMNS: usize = 1000;
 /// Row blocks read side by side, a block column at a time: as many as the hardware prefetches.
 const STREAMS: usize = 4;
 
+/// What backward substitution may leave out.
+#[derive(Clone, Copy)]
+pub(crate) struct Negligible<'a> {
+    /// Whether a front's subtree has a right-hand side that is not zero, (fronts).
+    pub(crate) has_data: &'a [bool],
+    /// Magnitude up to which the solution around a subtree without data counts as zero.
+    pub(crate) magnitude: f64,
+}
+
 /// Solves for `x` (n, width) in place, in elimination order.
-pub(crate) fn backward(tree: &Tree, panels: &[f64], arch: Arch, width: usize, x: &mut [f64]) {
+pub(crate) fn backward(
+    tree: &Tree,
+    panels: &[f64],
+    arch: Arch,
+    width: usize,
+    negligible: Option<Negligible<'_>>,
+    x: &mut [f64],
+) {
     let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
     let mut space = vec![0; tree.fronts.len()];
     for (index, front) in tree.fronts.iter().enumerate() {
@@ -25,7 +42,7 @@ pub(crate) fn backward(tree: &Tree, panels: &[f64], arch: Arch, width: usize, x:
     let root = tree.root();
     let mut work = Buffer::zeroed(space[root]);
     let panels = &panels[..tree.fronts[root].subtree_panels];
-    BackwardPass { tree, arch, width, space, fork }.descend(root, panels, x, &[], &mut work);
+    BackwardPass { tree, arch, width, space, fork, negligible }.descend(root, panels, x, &[], &mut work);
 }
 
 fn forks(front: &Front, columns: usize) -> bool {
@@ -45,9 +62,17 @@ struct BackwardPass<'a> {
     space: Vec<usize>,
     /// Columns of a subtree from which on it is divided between threads.
     fork: usize,
+    negligible: Option<Negligible<'a>>,
 }
 
 impl BackwardPass<'_> {
+    /// Whether the solution in the subtree of `root` is zero, as far as the caller cares.
+    fn is_negligible(&self, root: usize, boundary: &[f64]) -> bool {
+        self.negligible.is_some_and(|negligible| {
+            !negligible.has_data[root] && boundary.iter().all(|x| x.abs() <= negligible.magnitude)
+        })
+    }
+
     /// Solves the subtree of `root` given the solution in the root's rows.
     fn descend(&self, root: usize, panels: &[f64], x: &mut [f64], boundary: &[f64], work: &mut [f64]) {
         let front = &self.tree.fronts[root];
@@ -65,7 +90,9 @@ impl BackwardPass<'_> {
                 let front = &self.tree.fronts[root];
                 let (boundary, work) = work.split_at_mut(boundary_len(front, self.width));
                 parent.gather(front, self.width, boundary);
-                self.descend(root, panels, x, boundary, work);
+                if !self.is_negligible(root, boundary) {
+                    self.descend(root, panels, x, boundary, work);
+                }
             }
             _ => {
                 let (left, right) = roots.split_at(roots.len() / 2);

@@ -40,8 +40,8 @@ impl Active {
     }
 }
 
-/// Fills `x` (n, width), all zero, in elimination order.
-pub(crate) fn forward(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) {
+/// Fills `x` (n, width), all zero, in elimination order. Returns whether each front's subtree has anything but zeros, (fronts).
+pub(crate) fn forward(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) -> Vec<bool> {
     let nonzero = columns.nonzero();
     let mut active: Vec<Active> = Vec::with_capacity(tree.fronts.len());
     let mut panel_starts = Vec::with_capacity(tree.fronts.len());
@@ -59,6 +59,7 @@ pub(crate) fn forward(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns,
     let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
     let pass = ForwardPass { tree, panels, panel_starts, arch, columns, active };
     let Ok(()) = walk(tree, &plan, &pass, root, x, &mut own, &mut other);
+    pass.active.iter().map(|active| active.mask != 0).collect()
 }
 
 fn passed_len(front: &Front, active: &Active) -> usize {

@@ -1,17 +1,17 @@
 //! Every vertex has a row, trusted over a length that grows with its gap and its tilt.
 //!
 //! A vertex takes the point that is nearest in position and direction: the least `|x - y|^2 + mu^2 |n - n'|^2` over the
-//! source's points y, n and n' the unit normals. Its row is data with confidence `b = 4 M / h^2`, M the vertex's area and h the
-//! length, in the harmonic energy `w' S w`, which is solved twice. A wave of wavelength 2 pi h is damped to 0.64 of its height,
-//! shorter ones vanish and longer ones stay. On the skin h vanishes and the row is copied; a hand's breadth away it says only
-//! what the wider surroundings should be on average.
+//! source's points y, n and n' the unit normals. Its row is trusted over a length h (see [`screened`]). On the skin h vanishes
+//! and the row is copied; a hand's breadth away it says only what the wider surroundings should be on average. A crease or a hem
+//! is not a tilt: of the directions of the vertex and of the triangles around it, the one that agrees best with the source's
+//! counts.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Candidates, MaskValue, Matches, TargetSurface, Terms};
-use crate::adjacency::NONE;
-use crate::fill::Constraint;
+use crate::adjacency::{NONE, VertexTriangles};
+use crate::fill::{Constraint, screened};
 use crate::surface::{Bound, Priced, SurfacePoint};
 use crate::transfer::Source;
 
@@ -20,16 +20,16 @@ const DIRECTION: f64 = 0.015;
 /// The closest point is left only for one that costs less than this share of its own cost: where little is to be gained,
 /// neighbours would choose differently.
 const HYSTERESIS: f64 = 0.8;
-/// Spread of the costs, as a share of the least, that are averaged as a tie; nothing beyond this times sqrt(12) counts.
-const TIE: f64 = 0.15;
-const SLACK: f64 = 1.0 + 12.0 * TIE * TIE;
+/// Spread of the costs, as a share of the least, that are averaged as a tie; what would count for less than 2 % does not.
+const TIE: f64 = 0.3;
+const SLACK: f64 = 1.0 + 8.0 * TIE * TIE;
 /// Shares of the source's size: what is a tie of distances, and what is added to each length.
 const EQUALLY_NEAR: f64 = 1e-6;
 const FLOOR: f64 = 1e-3;
 /// Softness relative to the gap where both normals agree.
-const GAP: f64 = 1.0;
+const GAP: f64 = 0.93;
 /// How fast the tangent of the angle between the normals adds to it.
-const TILT: f64 = 3.0;
+const TILT: f64 = 2.8;
 /// Cosines below this count as this.
 const LEAST_COSINE: f64 = 0.05;
 /// A vertex is held at its row if it is trusted over less than this share of its shortest edge: smoothing over so little
@@ -43,7 +43,7 @@ const HALF_TRUSTED: f64 = 0.02;
 pub(super) struct Trust {
     /// Distance to the point that was chosen, world units.
     pub gap: Vec<f64>,
-    /// Cosine between the normals there.
+    /// Cosine between the normals there, 0 to 1.
     pub cosine: Vec<f64>,
 }
 
@@ -84,9 +84,17 @@ pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, T
         Bound { near: near * near, cost }
     };
     let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
+    let around = VertexTriangles::new(target.triangles, target.positions.len());
     let finish = |i: usize, found: &[Priced]| {
-        let priced: Vec<(Priced, f64)> = found.iter().map(|&p| (p, cosine(i, &p.point).unwrap_or(1.0))).collect();
-        choose(source, &priced, closest[i].distance, size)
+        let mut choice = choose(source, found, closest[i].distance, size);
+        let sides: Vec<Vec3> = around.around(i).iter().filter_map(|&t| side(&target, t)).collect();
+        let agreement = |(point, share): &(SurfacePoint, f64)| {
+            let directions = std::iter::once(&target.normals[i]).chain(&sides);
+            let cosines = directions.filter_map(|&normal| self::cosine(source, point, normal));
+            share * cosines.map(f64::abs).reduce(f64::max).unwrap_or(1.0)
+        };
+        choice.cosine = choice.points.iter().map(agreement).sum();
+        choice
     };
     let choices = source.index().cheapest_points(target.positions, &bounds, SLACK, cost, finish);
     let gap: Vec<f64> = choices.iter().map(|choice| choice.gap).collect();
@@ -118,31 +126,36 @@ fn may_move(cost: f64, distance: f64, size: f64) -> bool {
     HYSTERESIS * cost > distance * distance && cost.sqrt() - distance > 1e-3 * DIRECTION * size
 }
 
+/// Unit normal of a triangle of the target, unless it has none.
+fn side(target: &TargetSurface<'_>, t: u32) -> Option<Vec3> {
+    let [a, b, c] = target.triangles[t as usize].map(|i| Vec3::from(target.positions[i as usize]).as_dvec3());
+    (b - a).cross(c - a).try_normalize().map(DVec3::as_vec3)
+}
+
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
-fn choose(source: &Source, found: &[(Priced, f64)], distance: f64, size: f64) -> Choice {
+fn choose(source: &Source, found: &[Priced], distance: f64, size: f64) -> Choice {
     let near = (distance + EQUALLY_NEAR * size).powi(2);
     let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
     let least = |among: &dyn Fn(&Priced) -> bool| {
-        found.iter().filter(|(p, _)| among(p)).map(|(p, _)| p.cost).fold(f64::INFINITY, f64::min)
+        found.iter().filter(|&p| among(p)).map(|p| p.cost).fold(f64::INFINITY, f64::min)
     };
     let (least_near, least_of_all) = (least(&is_near), least(&|_| true));
     let moves = may_move(least_near, distance, size) && least_of_all < HYSTERESIS * least_near;
     let best = if moves { least_of_all } else { least_near };
     let smallest = (EQUALLY_NEAR * size).powi(2);
-    let tied = found.iter().filter(|(p, _)| (moves || is_near(p)) && p.cost <= SLACK * best + smallest);
+    let tied = found.iter().filter(|p| (moves || is_near(p)) && p.cost <= SLACK * best + smallest);
     let weight =
         |p: &Priced| source.area(p.point.triangle) * (-(p.cost - best) / (2.0 * TIE * TIE * (best + smallest))).exp();
-    let weighed: Vec<_> = tied.map(|&(p, cosine)| (p.point, weight(&p), cosine)).collect();
-    let sum: f64 = weighed.iter().map(|&(_, weight, _)| weight).sum();
+    let weighed: Vec<_> = tied.map(|p| (p.point, weight(p))).collect();
+    let sum: f64 = weighed.iter().map(|&(_, weight)| weight).sum();
     let share = |weight: f64| if sum > 0.0 { weight / sum } else { 1.0 / weighed.len() as f64 };
-    let gap = weighed.iter().map(|(point, weight, _)| share(*weight) * point.distance).sum();
-    let cosine = weighed.iter().map(|(_, weight, cosine)| share(*weight) * cosine).sum();
-    let mut points: Vec<_> = weighed.iter().map(|&(point, weight, _)| (point, share(weight))).collect();
+    let gap = weighed.iter().map(|(point, weight)| share(*weight) * point.distance).sum();
+    let mut points: Vec<_> = weighed.iter().map(|&(point, weight)| (point, share(weight))).collect();
     if points.windows(2).all(|pair| are_one(source, &pair[0].0, &pair[1].0)) {
         points.truncate(1);
         points.iter_mut().for_each(|(_, share)| *share = 1.0);
     }
-    Choice { points, gap, cosine }
+    Choice { points, gap, cosine: 1.0 }
 }
 
 /// Whether two triangles' points lie on the same corner or side.
@@ -160,7 +173,7 @@ fn are_one(source: &Source, first: &SurfacePoint, second: &SurfacePoint) -> bool
 
 /// Gap and tilt as one length, which softness multiplies. Normals that point the opposite way are those of linings, and no tilt.
 fn growth(gap: f64, cosine: f64) -> f64 {
-    let cosine = cosine.abs().max(LEAST_COSINE);
+    let cosine = cosine.max(LEAST_COSINE);
     gap * (GAP + TILT * (1.0 / (cosine * cosine) - 1.0))
 }
 
@@ -205,5 +218,5 @@ fn soft(terms: &Terms<'_>, i: usize, length: f64) -> Constraint {
     if length < HELD * edges.fold(f64::INFINITY, f64::min) {
         return Constraint::Fixed;
     }
-    Constraint::Soft(4.0 * laplacian.mass(i) / (length * length))
+    Constraint::Soft(screened::confidence(laplacian.mass(i), length))
 }
