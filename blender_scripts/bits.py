@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import sys
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import skinwright_native as skinwright
@@ -24,7 +24,7 @@ def main() -> None:
 
 
 def results():
-    """(name, arrays) of transfers, sculpts and desparsifications over sizes and settings."""
+    """(name, arrays) of every kind of calculation over sizes and settings."""
     for n in (12, 60, 150):
         body_positions, body_triangles = surface(n, 0.0, seed=n)
         body_weights = skinwright.Weights.from_dense(rows(body_positions, n_bones=9))
@@ -38,6 +38,10 @@ def results():
             parts(skinwright.desparsify(body_weights, np.arange(-1, 8, dtype=np.int32), method="hop")),
         )
         yield f"sculpt {n}", sculpted(body_positions, body_weights)
+        yield f"fill {n}", [filled(positions, triangles)]
+    for method in ("heat", "geodesic", "euclidean"):
+        yield f"automatic weights {method}", automatic(body_positions, body_triangles, method)
+    yield "refine", [refined(body_positions, body_triangles, body_weights)]
 
 
 SETTINGS = {
@@ -45,6 +49,7 @@ SETTINGS = {
     "harmonic": {"smoothness_length": 0.0},
     "smoothed": {"smoothing_iterations": 3},
     "limited": {"max_influences": 2},
+    "confidence": {"method": "confidence"},
     "tight": {"relative_max_distance": 0.02, "max_normal_angle": 0.4},
 }
 
@@ -86,6 +91,34 @@ def sculpted(positions: np.ndarray, weights) -> list[np.ndarray]:
     targets = solver.posed(touched, positions[touched]) + np.float32(0.01)
     stroke = solver.stroke(touched, targets)
     return [*parts(stroke.weights), stroke.residuals]
+
+
+def filled(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Three columns that are known on a seventh of the vertices, some of them softly."""
+    known = np.arange(len(positions)) % 7 == 0
+    kinds = np.where(known, 1 + (np.arange(len(positions)) % 14 == 0), 0).astype(np.uint8)
+    confidence = np.where(kinds == 2, np.float32(0.5), np.float32(0))
+    return skinwright.fill(positions, triangles, kinds, positions, confidence=confidence, length=0.1)
+
+
+def bones(n_bones: int) -> tuple[np.ndarray, np.ndarray]:
+    """Segments (B, 2, 3) of a chain along x below the surface, and the parent of each."""
+    joints = np.zeros((n_bones + 1, 3))
+    joints[:, 0], joints[:, 1], joints[:, 2] = np.arange(n_bones + 1) / n_bones, 0.5, -0.125
+    return np.stack([joints[:-1], joints[1:]], axis=1), np.arange(n_bones) - 1
+
+
+def automatic(positions: np.ndarray, triangles: np.ndarray, method: Any) -> list[np.ndarray]:
+    """Rows from scratch."""
+    return parts(skinwright.automatic_weights(positions, triangles, *bones(4), method=method).weights)
+
+
+def refined(positions: np.ndarray, triangles: np.ndarray, weights: skinwright.Weights) -> np.ndarray:
+    """Positions in a pose of shears."""
+    segments, parents = bones(9)
+    pose = np.tile(np.eye(4), (9, 1, 1))
+    pose[:, 2, 0] = np.arange(9) / 16
+    return skinwright.Refiner(positions, triangles, weights, parents, segments).solve(pose)
 
 
 if __name__ == "__main__":

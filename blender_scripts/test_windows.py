@@ -110,8 +110,21 @@ def run(blender: Blender, wine: str, wheel: Path, tests: list[str]) -> int:
     environment["SKINWRIGHT_ZIPS"] = windows_path(ROOT / "dist")
     prepare_wine(wine, environment)
     print(f"Windows, Blender {blender.module}, NumPy {blender.numpy}", flush=True)
-    command = [wine, str(blender.folder / "python" / "python.exe"), "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    return subprocess.run([*command, *tests], cwd=ROOT, env=environment, check=False).returncode
+    python = [wine, str(blender.folder / "python" / "python.exe")]
+    differing = compare_bits(python, environment)
+    command = [*python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
+    return subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode or differing
+
+
+def compare_bits(python: list[str], environment: dict[str, str]) -> int:
+    """Print how many results have the bits of this machine's module; returns 1 if one differs."""
+    script = "blender_scripts/bits.py"
+    there = subprocess.check_output([*python, script], cwd=ROOT, env=environment, encoding="utf-8").splitlines()
+    here = subprocess.check_output([sys.executable, script], cwd=ROOT, encoding="utf-8").splitlines()
+    differing = sorted(set(there) ^ set(here))
+    print(f"{len(here) - len(set(here) - set(there))} of {len(here)} results have the same bits as on this system.")
+    print(*differing, sep="\n", end="\n" if differing else "", flush=True)
+    return 1 if differing else 0
 
 
 def lay_out(blender: Blender, wheel: Path) -> None:

@@ -51,3 +51,9 @@ def test_random_actions_leave_everything_in_order(blender):
 
 def test_weights_are_retargeted_and_undone(blender):
     assert blender.run("retarget", timeout=300, size=(1100, 1000))["bones"] == 6
+
+
+def test_the_live_preview_follows_posing_undo_and_playback(blender):
+    seen = blender.run("live_refine", timeout=400, size=(1000, 760))
+    assert seen["posed"] > 0.02
+    assert len({frame for frame, _ in seen["played"]}) > 2

@@ -117,6 +117,18 @@ def nodes(boot, rig, body):
     boot.modifiers.new("Nodes", "NODES").node_group = tree
 
 
+def nodes_that_are_given_it(boot, rig, body):
+    nodes(boot, rig, boot)
+    modifier = boot.modifiers["Nodes"]
+    tree = modifier.node_group
+    tree.nodes["Object Info"].inputs["Object"].default_value = None
+    name = tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject").identifier
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, name).value = body
+    else:
+        modifier[name] = body
+
+
 def driven_place(boot, rig, body):
     driver = boot.driver_add("location", 2).driver
     target = driver.variables.new().targets[0]
@@ -190,6 +202,7 @@ KINDS = [
     (shrinkwrap, "modifier Wrap, which follows Body"),
     (warp, "modifier Warp, which follows Socket"),
     (nodes, "modifier Nodes, which follows Body"),
+    (nodes_that_are_given_it, "modifier Nodes, which follows Body"),
     (driven_place, "driver on location, which follows Rig"),
     (twice_by_modifiers, "deformed by Rig twice, the second time by the modifier Armature.001"),
     (twice_as_a_child, "deformed by Rig twice, by a modifier and as its child"),

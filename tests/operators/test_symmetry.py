@@ -11,15 +11,6 @@ from mathutils import Euler, Matrix  # noqa: E402
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-@pytest.fixture
-def plain(addon):
-    def call(source, *targets, **settings):
-        params = addon.transfer.TransferParams(**settings)
-        return addon.transfer.transfer_weights(bpy.context, source, list(targets), params)
-
-    return call
-
-
 def asymmetry(obj):
     """(V,) the largest difference between each row and its mirror image's, left and right exchanged."""
     positions = np.array([v.co for v in obj.data.vertices])

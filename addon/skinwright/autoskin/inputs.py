@@ -155,23 +155,15 @@ def _completed(obj: bpy.types.Object, rig: bpy.types.Object, names: list[str], p
     shape = shapes.read_target(obj, params.geometry)
     if not len(shape.geometry.triangles):
         raise SceneError(f"{obj.name} has no faces: this works along surfaces, so give it some")
-    opposite = sides.opposites(rig, names)
+    known = sides.opposites(rig, names)
     found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
-    reflections = [reflection for reflection in found if _mirrors_rightly(rig, opposite, reflection)]
+    reflections = [reflection for reflection in found if mirror.is_right(reflection, rig, known)]
     done = completion.complete(shape.geometry, reflections)
     if params.symmetrize:
         to_middle = np.linalg.inv(np.array(rig.matrix_world))
         across = mesh.transformed(shape.geometry.positions, to_middle)
         done = completion.symmetrised(done, symmetry.partners(across))
     return done
-
-
-def _mirrors_rightly(rig: bpy.types.Object, opposite: dict[str, str], reflection: mirror.Reflection) -> bool:
-    """Whether a mirrored copy's groups are those of the side it lies on."""
-    if reflection.flips and sides.unflippable(opposite):
-        return False
-    exchanged = sides.exchanged(rig, opposite, reflection.world)
-    return exchanged is None or exchanged == reflection.flips
 
 
 def _vertices(obj: bpy.types.Object, share: NDArray[np.float64] | float, params: AutoskinParams) -> NDArray[np.int64]:

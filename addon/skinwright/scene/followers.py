@@ -196,10 +196,19 @@ def _looked_at(modifier: bpy.types.Modifier) -> list[bpy.types.Object]:
     pointers = [p for p in modifier.bl_rna.properties if p.type == "POINTER" and p.fixed_type.identifier == "Object"]
     found = [getattr(modifier, pointer.identifier) for pointer in pointers]
     if modifier.type == "NODES" and modifier.node_group:
-        found += [value for value in modifier.values() if isinstance(value, bpy.types.Object)]
         sockets = [socket for node in modifier.node_group.nodes for socket in node.inputs if socket.type == "OBJECT"]
-        found += [socket.default_value for socket in sockets]
+        found += [*_node_inputs(modifier), *(socket.default_value for socket in sockets)]
     return [other for other in dict.fromkeys(found) if other]
+
+
+def _node_inputs(modifier: bpy.types.NodesModifier) -> list[bpy.types.Object | None]:
+    """The objects given to a node tree. Blender 5.2 keeps inputs as properties, those before as ID properties."""
+    sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
+    names = [s.identifier for s in sockets if s.in_out == "INPUT" and s.socket_type == "NodeSocketObject"]
+    if hasattr(modifier, "properties"):
+        inputs = [getattr(modifier.properties.inputs, name, None) for name in names]
+        return [getattr(given, "value", None) for given in inputs]
+    return [modifier.get(name) for name in names]
 
 
 def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: list[bpy.types.Object]) -> bool:

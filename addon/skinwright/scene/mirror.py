@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import modifiers
+from . import modifiers, sides
 
 
 @dataclass(frozen=True)
@@ -69,3 +69,11 @@ def _cuts_off(
     side = -side if modifier.use_bisect_flip_axis[axis] else side
     scale = float(np.abs(np.linalg.det(plane[:3, :3]))) ** (1 / 3)
     return bool(side.min(initial=0) < -(modifier.bisect_threshold + merged / scale + 1e-6))
+
+
+def is_right(reflection: Reflection, armature: bpy.types.Object | None, opposite: dict[str, str]) -> bool:
+    """Whether the copy's groups are those of the side it lies on; `opposite` has the other side's bone of each."""
+    if reflection.flips and sides.unflippable(opposite):
+        return False
+    exchanged = sides.exchanged(armature, opposite, reflection.world)
+    return exchanged is None or exchanged == reflection.flips

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..scene import armature, mesh, mirror, sides, vertex_groups
 from ..scene.error import SceneError
-from .inputs import Body, Garment, mirrors_rightly
+from .inputs import Body, Garment
 from .params import TransferParams
 
 
@@ -94,7 +94,7 @@ def _mirror(body: Body, garment: Garment) -> str:
     """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
     obj, shape = garment.object, garment.shape
     found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
-    wrong = [reflection for reflection in found if not mirrors_rightly(body, reflection)]
+    wrong = [reflection for reflection in found if not mirror.is_right(reflection, body.armature, body.opposite)]
     if not wrong:
         return ""
     named = wrong[0].name

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, binding, mask, mesh, mirror, shapes, sides, symmetry, vertex_groups
+from ..scene import armature, binding, mask, mesh, mirror, shapes, symmetry, vertex_groups
 from ..scene.error import SceneError
 from . import completion, merging
 from .body import Body, read_body
@@ -88,21 +88,13 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
 def _completed(target: bpy.types.Object, shape: shapes.Shape, body: Body, params: TransferParams) -> Completion:
     """With the halves that Mirror modifiers add, if the weights that these give them are the right ones."""
     found = mirror.reflections(target, shape.matrix, shape.geometry.positions)
-    reflections = [reflection for reflection in found if mirrors_rightly(body, reflection)]
+    reflections = [reflection for reflection in found if mirror.is_right(reflection, body.armature, body.opposite)]
     done = completion.complete(shape.geometry, reflections)
     if params.symmetrize:
         to_middle = np.linalg.inv(np.array((body.armature or body.object).matrix_world))
         across = mesh.transformed(shape.geometry.positions, to_middle)
         done = completion.symmetrised(done, symmetry.partners(across))
     return done
-
-
-def mirrors_rightly(body: Body, reflection: mirror.Reflection) -> bool:
-    """Whether a mirrored copy's groups are those of the side it lies on."""
-    if reflection.flips and sides.unflippable(body.opposite):
-        return False
-    exchanged = sides.exchanged(body.armature, body.opposite, reflection.world)
-    return exchanged is None or exchanged == reflection.flips
 
 
 def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], params: TransferParams) -> bool:

@@ -57,9 +57,9 @@ class Window:
         region = self.region()
         return region.x + region.width // 2, region.y + region.height // 2
 
-    def event(self, kind: str, value: str = "NOTHING", at: tuple[int, int] | None = None, **modifiers: bool) -> None:
+    def event(self, kind: str, value: str = "NOTHING", at: tuple[int, int] | None = None, **more: Any) -> None:
         x, y = at or self.centre()
-        self.window.event_simulate(type=kind, value=value, x=int(x), y=int(y), **modifiers)
+        self.window.event_simulate(type=kind, value=value, x=int(x), y=int(y), **more)
 
     def key(self, kind: str, **modifiers: bool) -> None:
         self.event(kind, "PRESS", **modifiers)
