@@ -120,7 +120,7 @@ pub(crate) mod tests {
         let (matrix, positions) = chain(1500);
         let rhs = sines(1500, 29);
         let oracle = Supernodal::factor(&matrix).unwrap();
-        let wanted = oracle.solve(&rhs, None);
+        let wanted = oracle.solve(&rhs);
         for arch in instruction_sets() {
             let mut solver = Multifrontal::factor(&matrix, &positions, &crate::NEVER).unwrap().unwrap();
             solver.arch = arch;

@@ -207,9 +207,7 @@ fn eight(column: &[f32], from: usize, count: usize) -> [f32; LANES] {
         return *column[from..].first_chunk().expect("eight more");
     }
     let mut some = [column[from]; LANES];
-    for lane in 0..count {
-        some[lane] = column[from + lane];
-    }
+    some[..count].copy_from_slice(&column[from..from + count]);
     some
 }
 
