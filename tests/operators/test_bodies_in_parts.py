@@ -251,7 +251,7 @@ class TestSides:
     def test_symmetrize(self, plain):
         """Bits are equal across the middle, left and right exchanged, though body and mesh are not symmetric."""
         body, skirt = figure.body(), figure.skirt()
-        body.vertex_groups["Leg.L"].add(list(range(200)), 0.3, "ADD")
+        body.vertex_groups["Leg.L"].add(list(range(len(body.data.vertices))), 0.3, "ADD")
         plain(body, skirt)
         lopsided = builders.dense(skirt, figure.BONES)
         plain(body, skirt, symmetrize=True)
@@ -259,7 +259,7 @@ class TestSides:
         other = np.linalg.norm(positions[:, None] * [-1, 1, 1] - positions[None], axis=2).argmin(axis=1)
         flipped = [0, 3, 4, 1, 2]
         assert np.array_equal(rows, rows[other][:, flipped])
-        assert not np.allclose(lopsided, lopsided[other][:, flipped], atol=1e-3)
+        assert not np.allclose(lopsided, lopsided[other][:, flipped], atol=1e-4)
         assert rows.sum(1) == pytest.approx(1, abs=1e-6)
         assert rows == pytest.approx((lopsided + lopsided[other][:, flipped]) / 2, abs=1e-6)
 

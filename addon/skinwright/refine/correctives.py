@@ -104,6 +104,7 @@ def steps(
     poses = samples(bones, params, [armature.rotation_limits(rig, character.bones[bone]) for bone in bones])
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
     solved = yield Solving([lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses])
+    seen.check()
     for one in solved:
         if not np.isfinite(one.offsets).all():
             raise SceneError(

@@ -76,4 +76,6 @@ def is_right(reflection: Reflection, armature: bpy.types.Object | None, opposite
     if reflection.flips and sides.unflippable(opposite):
         return False
     exchanged = sides.exchanged(armature, opposite, reflection.world)
-    return exchanged is None or exchanged == reflection.flips
+    if exchanged is None:  # then only names can tell
+        return reflection.flips or all(name == other for name, other in opposite.items())
+    return exchanged == reflection.flips

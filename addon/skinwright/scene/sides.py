@@ -65,7 +65,7 @@ def _by_position(armature: bpy.types.Object, names: list[str]) -> dict[str, str]
 
 
 def exchanged(armature: bpy.types.Object | None, opposite: dict[str, str], world: NDArray[np.float64]) -> bool | None:
-    """Whether the reflection `world` (4, 4) exchanges left and right; None where no bone has another side."""
+    """Whether the reflection `world` (4, 4) exchanges left and right; None where bones do not tell."""
     bones = armature.data.bones if armature else {}
     pairs = [(bones[n], bones[o]) for n, o in opposite.items() if o != n and n in bones and o in bones]
     if armature is None or not pairs:
@@ -74,7 +74,8 @@ def exchanged(armature: bpy.types.Object | None, opposite: dict[str, str], world
     here, there = (np.array([(*b[k].head_local, 1, *b[k].tail_local, 1) for b in pairs]) for k in (0, 1))
     here, there = (ends.reshape(-1, 4) @ place.T for ends in (here, there))
     reflected = here @ world.T
-    return bool(np.linalg.norm(reflected - there, axis=1).sum() < np.linalg.norm(reflected - here, axis=1).sum())
+    off = np.linalg.norm(reflected - there, axis=1).sum(), np.linalg.norm(reflected - here, axis=1).sum()
+    return None if np.isclose(*off, rtol=1e-6) else bool(off[0] < off[1])
 
 
 def unflippable(opposite: dict[str, str]) -> str:
