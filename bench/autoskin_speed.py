@@ -65,7 +65,7 @@ def measure(name: str, body: Rigged, positions: np.ndarray, triangles: np.ndarra
         result = native.automatic_weights(positions, triangles, body.segments, body.parents)
         stages.update(result.report["seconds"])
 
-    sides = {"Skinwright": ours}
+    sides: dict[str, Callable[[], object]] = {"Skinwright": ours}
     if blender:
         sides["Blender"] = in_blender(body, positions, triangles)
     times: dict[str, list[tuple[float, float]]] = {side: [] for side in sides}

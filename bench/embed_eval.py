@@ -40,7 +40,19 @@ PAIRS = (
 )
 ACROSS = ("q_male_peasant/body.glb", "q_female_peasant/body.glb")
 # By the beginnings of their names in lower case: MakeHuman's game rig, Quaternius' humans and animals.
-MAIN = ("pelvis", "hips", "spine", "abdomen", "torso", "chest", "back", "neck", "head", "clavicle", "shoulder")
+MAIN: tuple[str, ...] = (
+    "pelvis",
+    "hips",
+    "spine",
+    "abdomen",
+    "torso",
+    "chest",
+    "back",
+    "neck",
+    "head",
+    "clavicle",
+    "shoulder",
+)
 MAIN += ("upperarm", "lowerarm", "hand", "thigh", "calf", "foot", "upperleg", "lowerleg", "front")
 
 
@@ -107,7 +119,7 @@ def draw(cases: list[tuple[Rigged, Rigged, Method, native.Embedding]], path: Pat
         axis.scatter(*target.positions[:, [view, 1]].T, s=0.4, color="0.75", linewidths=0)
         ours = np.stack([result.heads, result.tails], axis=1)
         for segments, colour in ((target.segments, "tab:blue"), (ours, "tab:red")):
-            axis.add_collection(LineCollection(segments[:, :, [view, 1]], colors=colour, linewidths=0.9))
+            axis.add_collection(LineCollection(list(segments[:, :, [view, 1]]), colors=colour, linewidths=0.9))
             axis.scatter(*segments[:, 0][:, [view, 1]].T, s=4, color=colour)
         axis.set_aspect("equal")
         axis.set_title(f"{source.name} -> {target.name}, {method}", fontsize=7)

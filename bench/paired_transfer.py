@@ -38,7 +38,7 @@ def main() -> None:
             for side, seconds in zip(sides, taken, strict=True):
                 seconds.append(_turn(side))
         for side in sides:
-            side.stdin.close()
+            side.communicate()
         ours, theirs = (statistics.median(seconds[1:]) for seconds in taken)
         print(f"{kind}: {ours:.3f} s, the other {theirs:.3f} s, ratio {ours / theirs:.3f}", flush=True)
 
@@ -52,6 +52,7 @@ def _start(root: Path, native: str, kind: str) -> subprocess.Popen:
 
 
 def _turn(side: subprocess.Popen) -> float:
+    assert side.stdin and side.stdout, "pipes were asked for"
     side.stdin.write("go\n")
     side.stdin.flush()
     line = ""

@@ -15,6 +15,7 @@ import statistics
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import skinwright_native as native
 
@@ -55,7 +56,7 @@ def main() -> None:
         )
 
 
-def retarget(source: characters.Character, target: characters.Character, **settings: object) -> object:
+def retarget(source: characters.Character, target: characters.Character, **settings: Any) -> object:
     """One call of the library."""
     return native.retarget_weights(
         source.positions, source.triangles, native.Weights.from_dense(source.weights), source.frames, source.lengths,

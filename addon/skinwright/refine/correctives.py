@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -103,7 +104,7 @@ def steps(
     rig = bpy.data.objects[character.rig]
     poses = samples(bones, params, [armature.rotation_limits(rig, character.bones[bone]) for bone in bones])
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
-    solved = yield Solving([lambda sample=sample: _solve(character, refiner, sample, params) for sample in poses])
+    solved = yield Solving([partial(_solve, character, refiner, sample, params) for sample in poses])
     seen.check()
     for one in solved:
         if not np.isfinite(one.offsets).all():
@@ -112,7 +113,7 @@ def steps(
             )
     keys = _chosen(character, solved, params)
     report = CorrectiveReport(obj.name, character.rig, sampled=len(poses))
-    report.certificates = yield Solving([lambda key=key: _certify(character, refiner, key) for key in keys])
+    report.certificates = yield Solving([partial(_certify, character, refiner, key) for key in keys])
     seen.check()
     with driven_keys.all_or_nothing(obj, RECORD):
         _write(obj, character, keys, report)

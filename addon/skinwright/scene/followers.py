@@ -114,7 +114,8 @@ def _mute(obj: bpy.types.Object, follows: bpy.types.Constraint | bpy.types.FCurv
 def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
     """Armature modifiers that are not bound as the source is; ending one removes it."""
     models = [model for model in armature.modifiers(sources[0]) if model.show_viewport]
-    found, seen = [], [(model.object, _binding(model)) for model in models]
+    found: list[tuple[tuple, tuple[str, bpy.types.ArmatureModifier]]] = []
+    seen = [(model.object, _binding(model)) for model in models]
     for modifier in armature.modifiers(obj):
         if not modifier.show_viewport:
             continue

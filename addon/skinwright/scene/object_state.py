@@ -15,7 +15,7 @@ from . import rest_shape, weight_state
 from .rest_shape import RestShape
 from .weight_state import WeightState
 
-_PLACE = ("parent", "parent_type", "parent_bone", "matrix_parent_inverse", "location", "scale")
+_PLACE: tuple[str, ...] = ("parent", "parent_type", "parent_bone", "matrix_parent_inverse", "location", "scale")
 _PLACE += ("rotation_euler", "rotation_quaternion", "rotation_axis_angle")
 
 
