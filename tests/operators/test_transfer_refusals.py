@@ -142,9 +142,10 @@ class TestSource:
 class TestTarget:
     """Garments that can take nothing."""
 
-    def test_too_far_away(self, body, coat):
+    @pytest.mark.parametrize("method", ["PAPER", "CONFIDENCE"])
+    def test_too_far_away(self, body, coat, method):
         coat.location.z = 50
-        refused("Coat: .*distance", coat)
+        refused("Coat: .*distance", coat, method=method)
 
     def test_no_vertices(self, body, coat):
         builders.select(builders.mesh("Empty", [], []))
