@@ -105,6 +105,7 @@ def _compute_group(
     """The results of targets that are solved together; `packed` are the weights of the fields."""
     start = time.perf_counter()
     prepared = Prepared(body, source, garments, params)
+    prepared.check_reach(params)
     lost = prepared.lost_halves()
     if any(lost):
         # A mirrored half with nothing to match would be solved from this half's side and then drag it to the middle.

@@ -15,6 +15,10 @@ from .inputs import Body, Garment
 from .params import TransferParams
 
 
+# Confidence has no threshold, but a target farther away than this share of the body's diagonal is in another place or unit.
+_OUT_OF_REACH = 0.5
+
+
 class Prepared:
     """Targets laid over a body as one mesh; the mask and the thresholds may still change.
 
@@ -48,6 +52,16 @@ class Prepared:
         """What a relative distance refers to, world units."""
         target, source = (_diagonal(shape, self._frame) for shape in self._shapes)
         return max(target, 0.3 * source)
+
+    def check_reach(self, params: TransferParams) -> None:
+        """Raise NativeError if all is so far away that it must be a mistake; other methods find nothing to match then."""
+        reach = _OUT_OF_REACH * _diagonal(self._shapes[1], self._frame)
+        nearest = float(np.min(self.distance, initial=np.inf))
+        if params.method == "confidence" and nearest > reach:
+            raise native.NativeError(
+                f"{self.name}: nothing matched: its smallest distance from the source is {nearest:.4g}, more than half of "
+                f"the source's size: check that both have the same scale and place"
+            )
 
     def set_source_weights(self, rows: Rows, n_columns: int) -> None:
         """Gives the body other weights; a solve with them factors nothing again."""

@@ -39,12 +39,7 @@ impl Problem {
         for (&island, _) in known.filter(|&(&island, c)| island != NONE && c.is_known()) {
             has_match[island as usize] = true;
         }
-        let is_anchored = match settings.method {
-            MatchMethod::ClosestPoint => has_match.contains(&true),
-            // However far a vertex is, it trusts its row a little.
-            MatchMethod::Confidence => has_match.contains(&true) && (is_in_reach(prepared, mask) || is_forced(mask)),
-        };
-        if !is_anchored && !can_do_without_match(prepared, mask, settings) {
+        if !has_match.contains(&true) && !can_do_without_match(prepared, mask, settings) {
             return Err(nothing_matched(prepared, &criteria, mask, settings));
         }
         let smoothness_length = match settings.method {
@@ -65,18 +60,10 @@ pub(super) fn terms<'a>(prepared: &'a Inpainting, settings: &Settings) -> Terms<
 /// Whether the policy for islands has an answer where nothing matches: it has one near the body, unless the mask forbids
 /// every vertex to match.
 fn can_do_without_match(prepared: &Inpainting, mask: Option<&[MaskValue]>, settings: &Settings) -> bool {
-    settings.island_policy != IslandPolicy::Skip && is_in_reach(prepared, mask)
-}
-
-/// Whether any vertex that the mask lets match is near enough for this not to be a mistake.
-fn is_in_reach(prepared: &Inpainting, mask: Option<&[MaskValue]>) -> bool {
     let is_allowed = |i: usize| mask.is_none_or(|mask| mask[i] != MaskValue::Inpaint);
     let reach = OUT_OF_REACH * prepared.source.diagonal();
-    prepared.matches.weighted_distances(is_allowed).any(|distance| distance <= reach)
-}
-
-fn is_forced(mask: Option<&[MaskValue]>) -> bool {
-    mask.is_some_and(|mask| mask.contains(&MaskValue::ForceMatch))
+    let mut distances = prepared.matches.weighted_distances(is_allowed);
+    settings.island_policy != IslandPolicy::Skip && distances.any(|distance| distance <= reach)
 }
 
 fn nothing_matched(
@@ -85,10 +72,6 @@ fn nothing_matched(
     mask: Option<&[MaskValue]>,
     settings: &Settings,
 ) -> Error {
-    let max_distance = match settings.method {
-        MatchMethod::ClosestPoint => criteria.max_distance,
-        MatchMethod::Confidence => OUT_OF_REACH * prepared.source.diagonal(),
-    };
     let needed = prepared.matches.smallest_matching_distance(criteria, mask);
     let reference = Criteria::distance_reference(&prepared.source, &prepared.target);
     let relative = |needed: f64| match settings.max_distance {
@@ -96,13 +79,10 @@ fn nothing_matched(
         Length::Absolute(_) => String::new(),
     };
     let advice = match needed {
-        Some(needed) if settings.method == MatchMethod::Confidence => {
-            format!("the nearest is {needed:.6} away: check that both have the same scale and place")
-        }
         Some(needed) => format!("the smallest distance that matches something is {needed:.6}{}", relative(needed)),
         None => "no distance would help: check the mask, the largest normal angle and the source's weights".into(),
     };
-    Error::NothingMatched { max_distance, needed, advice }
+    Error::NothingMatched { max_distance: criteria.max_distance, needed, advice }
 }
 
 /// Transfers the weights, on the mesh that is solved on.
