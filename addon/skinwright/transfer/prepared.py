@@ -14,7 +14,6 @@ from . import parts
 from .inputs import Body, Garment
 from .params import TransferParams
 
-
 # Confidence has no threshold, but a target farther away than this share of the body's diagonal is in another place or unit.
 _OUT_OF_REACH = 0.5
 
