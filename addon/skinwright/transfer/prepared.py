@@ -14,7 +14,7 @@ from . import parts
 from .inputs import Body, Garment
 from .params import TransferParams
 
-# Confidence has no threshold, but a target farther away than this share of the body's diagonal is in another place or unit.
+# Without thresholds, what is farther away than this share of the body's diagonal is in the wrong place or unit.
 _OUT_OF_REACH = 0.5
 
 
@@ -53,13 +53,13 @@ class Prepared:
         return max(target, 0.3 * source)
 
     def check_reach(self, params: TransferParams) -> None:
-        """Raise NativeError if all is so far away that it must be a mistake; other methods find nothing to match then."""
+        """Raise NativeError if all is so far away that it must be a mistake; thresholds refuse that by themselves."""
         reach = _OUT_OF_REACH * _diagonal(self._shapes[1], self._frame)
         nearest = float(np.min(self.distance, initial=np.inf))
         if params.method == "confidence" and nearest > reach:
             raise native.NativeError(
-                f"{self.name}: nothing matched: its smallest distance from the source is {nearest:.4g}, more than half of "
-                f"the source's size: check that both have the same scale and place"
+                f"{self.name}: nothing matched: its smallest distance from the source is {nearest:.4g}, more than half "
+                "of the source's size: check that both have the same scale and place"
             )
 
     def set_source_weights(self, rows: Rows, n_columns: int) -> None:
