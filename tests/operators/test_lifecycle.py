@@ -10,6 +10,13 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 
 
+@pytest.fixture(autouse=True)
+def presets_label(addon, monkeypatch):
+    """Blender relabels the class when a preset is executed, saved or removed: the label comes back afterwards."""
+    panel = addon.ui.panel.SKINWRIGHT_PT_transfer_presets
+    monkeypatch.setattr(panel, "bl_label", panel.bl_label)
+
+
 def trace():
     """Everything an add-on may leave behind."""
     menus = (
@@ -153,9 +160,7 @@ def test_the_settings_last_used_are_the_panels(addon, scene):
     assert settings.max_influences == 1  # refused means unchanged
 
 
-def test_saving_and_removing_a_preset(addon, scene, monkeypatch):
-    panel = addon.ui.panel.SKINWRIGHT_PT_transfer_presets
-    monkeypatch.setattr(panel, "bl_label", panel.bl_label)  # Blender relabels the class when a preset is removed
+def test_saving_and_removing_a_preset(addon, scene):
     scene.skinwright.transfer.max_influences = 4
     bpy.ops.skinwright.transfer_preset_add(name="Mine")
     files = [
