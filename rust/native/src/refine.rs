@@ -116,7 +116,7 @@ impl Refiner {
     fn report(&self, py: Python<'_>) -> PyResult<Option<Py<PyDict>>> {
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let Some((pose, quality)) = last else { return Ok(None) };
-        let solve = || self.core.solve_with_report(&pose, quality, core::projection::Kernel::Lanes);
+        let solve = || self.core.solve_with_report(&pose, quality, core::Kernel::Lanes);
         let (_, report) = self.enter(py, solve)?;
         Ok(Some(figures(py, &report)?.unbind()))
     }

@@ -25,6 +25,8 @@ pub(super) struct ActiveJoint<'a> {
     pub(super) reach: f32,
     /// The angle by which it swings, radians.
     pub(super) swing: f32,
+    /// What else it turns by, radians.
+    pub(super) twist: f32,
 }
 
 /// The joints that turn, in order of bones.
@@ -36,7 +38,7 @@ pub(super) fn active_joints<'a>(joints: &'a [Joint], path: &Path<'_>, pose: &[DA
         let twist = (path.angle(joint.bone) - path.swing_angle(joint.bone)).max(0.0) as f32;
         let radii = (bend / 2.0).tan() + MARGIN + twist / std::f32::consts::PI;
         let reach = joint.radius * (radii / STEP).ceil() * STEP;
-        ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32 }
+        ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32, twist }
     };
     joints.iter().filter(turns).map(active).collect()
 }

@@ -6,7 +6,7 @@
 //! a walk from rest leaves none. No frame depends on another.
 
 mod balloon;
-pub mod constraint;
+mod constraint;
 mod contact;
 mod coupling;
 mod crease;
@@ -16,33 +16,39 @@ mod lattice;
 mod local;
 mod morton;
 mod node_weights;
-pub mod number;
+mod number;
 mod pairs;
 mod predictor;
 mod prepared;
-pub mod projection;
+mod projection;
 mod region;
 mod report;
 mod settings;
 mod skeleton;
 mod solver;
 mod surface;
+#[cfg(test)]
+mod tests;
+mod whole;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, Vec3};
 
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
-use self::projection::Kernel;
+pub use self::projection::Kernel;
 pub use self::report::{JointMeasure, JointReport, Report};
 pub use self::settings::{Quality, Settings};
+use self::solver::Work;
 use crate::error::Result;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::skinning::{check_length, dual_quaternion_blend};
 use crate::weights::Weights;
 
-/// What keeping limbs apart may cost of the volume.
+/// The volume that may be missing once limbs are kept apart, as a share of all of it.
 const MOST_LOST: f64 = 0.02;
+/// And what keeping them apart may cost where more than that is missing already.
+const MOST_COST: f64 = 0.005;
 
 /// A character prepared for refinement: any number of poses, in any order.
 ///
@@ -156,7 +162,8 @@ impl Refiner {
         let mut positions = self.skinned(pose_from_rest)?;
         let skinned = start.elapsed().as_secs_f64() * 1e3;
         let pose = self.prepared.in_cells(pose_from_rest);
-        let mut solution = solver::solve(&self.prepared, &self.settings, &pose, quality, kernel, with_figures);
+        let work = Work { quality, kernel, with_figures };
+        let mut solution = solver::solve(&self.prepared, &self.settings, &pose, &positions, work);
         let mut place = vec![None; self.prepared.surface.len()];
         solution.moved.iter().for_each(|&(vertex, at)| place[vertex as usize] = Some(self.prepared.in_mesh(at)));
         for (position, &welded) in positions.iter_mut().zip(&self.prepared.surface.of_vertex) {
@@ -185,7 +192,7 @@ impl Refiner {
             return;
         }
         // Layers of cloth can be smoothed away; they had better pass through each other.
-        if self.lost(&places) > before.max(MOST_LOST) {
+        if self.lost(&places) > MOST_LOST.max(before + MOST_COST) {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {
@@ -199,11 +206,8 @@ impl Refiner {
     /// By how much the volume of the skin at `places` (welded) differs from rest, as a share.
     fn lost(&self, places: &[Vec3]) -> f64 {
         let surface = &self.prepared.surface;
-        let volume = |at: &dyn Fn(u32) -> DVec3| -> f64 {
-            surface.triangles.iter().map(|t| t.map(at)).map(|[a, b, c]| a.dot(b.cross(c))).sum()
-        };
-        let now = volume(&|i| places[i as usize].as_dvec3());
-        (now / volume(&|i| surface.rest[i as usize]) - 1.0).abs()
+        let now = surface.volume(|i| places[i as usize].as_dvec3());
+        (now / surface.volume(|i| surface.rest[i as usize]) - 1.0).abs()
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.

@@ -21,14 +21,16 @@ use super::skeleton::Path;
 
 /// Most steps of a frame.
 const MOST_STEPS: usize = 24;
-/// Iterations where nothing bends: twist alone, from dual quaternions.
+/// Iterations in all where something twists: dual quaternions pinch a wrist that only twists, whatever else bends a little.
 const TWIST_ITERATIONS: usize = 10;
+/// Twist from which that many are taken, radians.
+const TWISTS: f64 = 0.5;
 /// Share by which skin goes back to its place in the lattice in each iteration.
 const REJOIN: f32 = 0.1;
 /// Skin around a contact that the balloon leaves alone, in radii.
-const KEPT: f32 = 0.3;
+pub(super) const KEPT: f32 = 0.3;
 /// Depth above the plane up to which skin counts as in contact for the balloon, in radii.
-const IN_CONTACT: f32 = 0.04;
+pub(super) const IN_CONTACT: f32 = 0.04;
 /// Passes over the creases in each iteration.
 const PASSES: usize = 2;
 /// Loss of a joint's volume from which it is asked whether skinning did better.
@@ -60,14 +62,22 @@ pub(super) struct Solution {
     pub(super) report: Report,
 }
 
-/// Solves a pose (in cells). The answer depends on the pose alone, not on any earlier one.
+/// How a frame is solved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Work {
+    pub(super) quality: Quality,
+    pub(super) kernel: Kernel,
+    pub(super) with_figures: bool,
+}
+
+/// Solves a pose (in cells). The answer depends on the pose alone, not on any earlier one. `skin` is where dual quaternions
+/// have the mesh' vertices (mesh units).
 pub(super) fn solve(
     prepared: &Prepared,
     settings: &Settings,
     pose: &[DAffine3],
-    quality: Quality,
-    kernel: Kernel,
-    with_figures: bool,
+    skin: &[[f32; 3]],
+    Work { quality, kernel, with_figures }: Work,
 ) -> Solution {
     let mut clock = Clock::default();
     let path = Path::new(&prepared.skeleton, pose);
@@ -78,7 +88,7 @@ pub(super) fn solve(
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
     frame.walk(&path, quality);
-    frame.finish(pose, quality);
+    frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
     Solution { moved: frame.moved(), report }
 }
@@ -110,11 +120,11 @@ fn flesh(settings: &Settings) -> Flesh {
     Flesh { volume: TETRAHEDRON, arm: ARM, volume_compliance: volume, energy_compliance: energy }
 }
 
-struct Frame<'a> {
-    prepared: &'a Prepared,
-    settings: &'a Settings,
-    active: &'a [ActiveJoint<'a>],
-    local: Local,
+pub(super) struct Frame<'a> {
+    pub(super) prepared: &'a Prepared,
+    pub(super) settings: &'a Settings,
+    pub(super) active: &'a [ActiveJoint<'a>],
+    pub(super) local: Local,
     kernel: Kernel,
     clock: Clock,
     iterations: usize,
@@ -130,7 +140,9 @@ impl Frame<'_> {
         let swing = self.active.iter().map(|active| f64::from(active.swing)).fold(0.0, f64::max);
         let bends = swing > 1f64.to_radians();
         let steps = if bends { ((swing / quality.sub_angle()).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
-        let iterations = if bends { quality.iterations() } else { TWIST_ITERATIONS };
+        let twists = !bends || self.active.iter().any(|active| f64::from(active.twist) > TWISTS);
+        let least = if twists { TWIST_ITERATIONS.div_ceil(steps) } else { 0 };
+        let iterations = quality.iterations().max(least);
         let mut before = path.at(if bends { 0.0 } else { 1.0 });
         place_all(self.prepared, &mut self.local, &before);
         for step in 1..=steps {
@@ -217,7 +229,7 @@ impl Frame<'_> {
         }
     }
 
-    fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
+    pub(super) fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
         if !self.settings.self_collision {
             return None;
         }
@@ -226,7 +238,7 @@ impl Frame<'_> {
     }
 
     /// The last passes over the creases, and the volume.
-    fn finish(&mut self, pose: &[DAffine3], quality: Quality) {
+    fn finish(&mut self, pose: &[DAffine3], skin: &[[f32; 3]], quality: Quality) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
         let membranes = clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
@@ -252,6 +264,7 @@ impl Frame<'_> {
         for _ in 0..quality.balloons() {
             clock.time("balloon", || {
                 (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
+                self.inflate_whole(&axes, pose, skin, &parted);
             });
             let (more, pairs) = clock.time("contact", || self.part(&suspects));
             left = pairs;
@@ -379,7 +392,7 @@ impl Frame<'_> {
     }
 
     /// By how much the bones' own scale changes the joint's volume.
-    fn growth(&self, k: usize, pose: &[DAffine3]) -> f64 {
+    pub(super) fn growth(&self, k: usize, pose: &[DAffine3]) -> f64 {
         let joint = self.active[k].joint;
         (pose[joint.parent].matrix3.determinant() + pose[joint.bone].matrix3.determinant()) / 2.0
     }

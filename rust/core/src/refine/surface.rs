@@ -26,6 +26,8 @@ pub(super) struct Surface {
     /// The connected component of each welded vertex, and how many there are.
     pub(super) island: Vec<u32>,
     pub(super) islands: usize,
+    /// Whether every edge has one triangle on each side, so that what is enclosed has a volume.
+    pub(super) is_closed: bool,
     /// Neighbours along edges, compressed by vertex, ascending.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -46,11 +48,17 @@ impl Surface {
         let mut sets = DisjointSets::new(source.len());
         edges.iter().for_each(|&[i, j]| sets.union(i, j));
         let (island, islands) = sets.number(|i| starts[i as usize] < starts[i as usize + 1]);
-        Self { rest, of_vertex, source, triangles, island, islands, starts, neighbours, edges }
+        let is_closed = is_closed(&triangles);
+        Self { rest, of_vertex, source, triangles, island, islands, is_closed, starts, neighbours, edges }
     }
 
     pub(super) fn len(&self) -> usize {
         self.rest.len()
+    }
+
+    /// The signed volume enclosed by the triangles with vertices at `at`, if the surface is closed.
+    pub(super) fn volume(&self, at: impl Fn(u32) -> DVec3) -> f64 {
+        self.triangles.iter().map(|t| t.map(&at)).map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0
     }
 
     /// The vertices that share an edge with vertex `i`.
@@ -77,6 +85,13 @@ fn weld(mesh: &TriMesh<'_>) -> (Vec<u32>, Vec<u32>) {
     order.iter().enumerate().for_each(|(n, &class)| number[class as usize] = n as u32);
     let of_vertex = weld.class_of().iter().map(|&class| number[class as usize]).collect();
     (of_vertex, order.iter().map(|&class| first[class as usize]).collect())
+}
+
+fn is_closed(triangles: &[[u32; 3]]) -> bool {
+    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    sides.sort_unstable();
+    let once = sides.windows(2).all(|pair| pair[0] != pair[1]);
+    once && sides.iter().all(|&[i, j]| sides.binary_search(&[j, i]).is_ok())
 }
 
 fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {

@@ -1,0 +1,92 @@
+//! The volume of the whole body, where hips and shoulders meet: the ends of their regions do not move rigidly, so that what
+//! each of them is measured to enclose misses what is lost between them.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use super::balloon::Balloon;
+use super::constraint::Axis;
+use super::coupling::place;
+use super::crease::{bind_skin, within};
+use super::joints::Member;
+use super::solver::{Frame, IN_CONTACT, KEPT};
+
+/// Share of the body's volume that may be missing.
+const TOLERATED: f64 = 0.01;
+/// Most that is restored, as a share of the body's volume.
+const MOST: f64 = 0.05;
+/// Bones that change a joint's volume by more than this scale the body, and its volume is not that of rest.
+const RIGID: f64 = 1e-3;
+
+impl Frame<'_> {
+    /// Restores what is missing of a closed body's volume beyond a tolerated share, at the joints that are no limbs. `skin`
+    /// is where dual quaternions have the mesh' vertices (mesh units).
+    pub(super) fn inflate_whole(&mut self, axes: &[Axis], pose: &[DAffine3], skin: &[[f32; 3]], parted: &[u32]) {
+        let trunk: Vec<usize> = (0..self.active.len()).filter(|&k| !self.active[k].joint.is_limb).collect();
+        let is_rigid = (0..self.active.len()).all(|k| (self.growth(k, pose) - 1.0).abs() < RIGID);
+        if self.settings.volume == 0.0 || trunk.is_empty() || !is_rigid || !self.prepared.surface.is_closed {
+            return;
+        }
+        let (missing, whole) = self.missing(skin);
+        let excess = missing - missing.clamp(-TOLERATED * whole, TOLERATED * whole);
+        if excess == 0.0 {
+            return;
+        }
+        let members = self.members(&trunk);
+        let kept = self.kept(axes, parted);
+        let balloon = Balloon::new(&self.local, &members, &kept);
+        let first = self.active[trunk[0]].joint;
+        let now = balloon.volume(axes[trunk[0]].origin, |p| place(&self.local.particles[p as usize]));
+        let target = now + 6.0 * excess.clamp(-MOST * whole, MOST * whole);
+        let limbs: Vec<usize> = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb).collect();
+        let (region, bind) = (Arc::clone(&self.local.region), self.settings.bind as f32);
+        let creases: Vec<_> = limbs.iter().map(|&k| self.crease(k, &axes[k], 1.0, &region.free[k])).collect();
+        balloon.inflate(&mut self.local, axes[trunk[0]].origin, target, first.radius, |local| {
+            for (&k, crease) in limbs.iter().zip(&creases) {
+                if bind > 0.0 {
+                    bind_skin(local, &axes[k], &region.free[k], bind);
+                }
+                if let Some(crease) = crease {
+                    crease.separate(local);
+                }
+            }
+        });
+    }
+
+    /// The volume that is missing, in cells, and all of it at rest.
+    fn missing(&self, skin: &[[f32; 3]]) -> (f64, f64) {
+        let (prepared, surface) = (self.prepared, &self.prepared.surface);
+        let in_cells = |&i: &u32| (Vec3::from(skin[i as usize]).as_dvec3() - prepared.middle) / prepared.cell;
+        let mut places: Vec<DVec3> = surface.source.iter().map(in_cells).collect();
+        for p in self.local.nodes..self.local.particles.len() {
+            let vertex = self.local.global[p] as usize - prepared.node_count();
+            places[vertex] = place(&self.local.particles[p]).as_dvec3();
+        }
+        let at_rest = |i: u32| prepared.rest[prepared.node_count() + i as usize].as_dvec3();
+        let whole = surface.volume(at_rest);
+        (whole - surface.volume(|i| places[i as usize]), whole)
+    }
+
+    /// The free members of some joints, each particle once, ascending.
+    fn members(&self, joints: &[usize]) -> Vec<Member> {
+        let mut members: Vec<Member> = joints.iter().flat_map(|&k| self.local.free[k].iter().copied()).collect();
+        members.sort_by_key(|member| member.particle);
+        members.dedup_by_key(|member| member.particle);
+        members
+    }
+
+    /// Skin in contact and near it, which stays.
+    fn kept(&self, axes: &[Axis], parted: &[u32]) -> Vec<u32> {
+        let mut kept = Vec::new();
+        for (k, axis) in axes.iter().enumerate() {
+            let radius = self.active[k].joint.radius;
+            let crease = self.crease(k, axis, 1.0, &self.local.region.free[k]);
+            let contacts = crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * radius)).unwrap_or_default();
+            kept.extend(within(&self.local, &self.prepared.rest, &contacts, KEPT * radius));
+        }
+        let radius = self.active.iter().map(|active| active.joint.radius).fold(f32::INFINITY, f32::min);
+        kept.extend(within(&self.local, &self.prepared.rest, parted, KEPT * radius));
+        kept
+    }
+}
