@@ -234,7 +234,7 @@ class TestPainting:
 
     def test_finish_restores_group_and_overlay(self, coat, painting):
         painting.finish()
-        painting.close(bpy.context)
+        painting.close()
         assert coat.vertex_groups.active.name == "Old"
         assert bpy.context.scene.skinwright.overlay.kind == "NONE"
         assert coat.skinwright.mask_group == "Match Mask"
