@@ -36,6 +36,10 @@ def test_no_session_is_lost_and_none_is_left_behind(blender):
     assert len(blender.run("sessions", timeout=900, size=(700, 520))["passed"]) == 13
 
 
+def test_what_happens_around_sessions_harms_nothing(blender):
+    assert len(blender.run("sideways", timeout=900, size=(700, 520))["passed"]) == 18
+
+
 def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
     seen = blender.run("sculpt_release", timeout=200, size=(640, 480), real_mouse=True)
     assert seen["brush down"] > 0

@@ -19,7 +19,7 @@ def open_only(name: str) -> None:
     """The panels of one module without their arrows closed, and none else of the tab."""
     module = import_module(f"{EXTENSION}.ui.{name}")
     kept = [cls for cls in vars(module).values() if isinstance(cls, type) and issubclass(cls, bpy.types.Panel)]
-    kept = [cls for cls in kept if cls.is_registered]
+    kept = [cls for cls in kept if cls is not bpy.types.Panel and cls.is_registered]
     for cls in reversed([cls for cls in bpy.types.Panel.__subclasses__() if cls.is_registered]):
         if getattr(cls, "bl_category", "") == "Weights" and cls not in kept and not hasattr(cls, "bl_parent_id"):
             bpy.utils.unregister_class(cls)
