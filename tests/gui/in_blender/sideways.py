@@ -435,7 +435,7 @@ def a_preview_that_loses_its_objects(window: Window) -> Steps:
             enable()
         bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
         rig = bpy.data.objects.get("Rig")
-        if rig:
+        if rig and "Lower" in rig.pose.bones:
             rig.pose.bones["Lower"].rotation_euler[2] = 0.5
         window.event("MOUSEMOVE")
         yield 0.6
