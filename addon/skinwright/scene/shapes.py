@@ -1,6 +1,6 @@
 """An object's shape in three ways: its mesh alone, as it is shown but in rest pose, or as it is shown now."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Literal
@@ -64,6 +64,19 @@ def read_target(obj: bpy.types.Object, look: Look) -> Shape:
         return Shape(geometry, np.array(shown.matrix_world), unseen)
 
 
+def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: list[str]) -> Rows:
+    """What this modifier alone leaves of the mesh's weights in the groups `names`."""
+    place = list(obj.modifiers).index(modifier)
+    with _evaluable(obj) as shown, _without(m for i, m in enumerate(shown.modifiers) if i != place):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        evaluated = shown.evaluated_get(depsgraph)
+        seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        try:
+            return vertex_groups.read_evaluated(evaluated, seen, names)
+        finally:
+            evaluated.to_mesh_clear()
+
+
 def _plain(obj: bpy.types.Object) -> Shape:
     return Shape(mesh.read(obj), np.array(obj.matrix_world), [])
 
@@ -72,6 +85,7 @@ def _is_shaped(obj: bpy.types.Object, look: Look) -> bool:
     """Whether anything but the mesh itself makes the shape."""
     shown = modifiers.shown(obj)
     shaping = any(modifiers.moves(m) or modifiers.changes_weights(m) for m in shown) or keys_in_use(obj)
+    shaping = shaping or (armature.deforms_as_parent(obj) and obj.parent.type != "ARMATURE")
     return shaping or (look == "CURRENT" and bool(armature.rigs(obj)))
 
 
@@ -106,13 +120,21 @@ def _kept_positions(obj: bpy.types.Object, look: Look) -> tuple[NDArray[np.float
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:
-    try:
-        for modifier in off:
-            modifier.show_viewport = False
+    with _without(off):
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
         return mesh.positions(evaluated.data)
+
+
+@contextmanager
+def _without(off: Iterable[bpy.types.Modifier]) -> Iterator[None]:
+    """Hide modifiers for the moment; those that are hidden already stay so."""
+    hidden = [modifier for modifier in off if modifier.show_viewport]
+    try:
+        for modifier in hidden:
+            modifier.show_viewport = False
+        yield
     finally:
-        for modifier in off:
+        for modifier in hidden:
             modifier.show_viewport = True
 
 

@@ -102,7 +102,7 @@ def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], pa
     if params.geometry != "CURRENT" or not any(armature.is_posed(rig) for rig in body.rigs):
         return False
     follows = set(armature.rigs(target)) & set(body.rigs)
-    if not follows and (armature.find(target) or not params.add_armature):
+    if not follows and (armature.follows_any(target, body.rigs) or not params.add_armature):
         return False  # another armature moves it, or none will
     if follows and (vertex_groups.read(target, names).values > 0).any():
         return False

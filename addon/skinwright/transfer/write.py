@@ -54,7 +54,7 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
     vertex_groups.ensure(target, sorted({body.opposite.get(name, name) for name in names} & set(body.bones)))
     warnings += _let_weights_rule(body, garment, names, params)
     warnings += _short_rows(garment, vertices)
-    attached = params.add_armature and bool(body.rigs) and armature.find(target) is None
+    attached = params.add_armature and bool(body.rigs) and not armature.follows_any(target, body.rigs)
     if attached:
         armature.attach(target, body.object)
     warnings += _smooth(body, target, params)
