@@ -7,6 +7,10 @@ def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
 
 
+def test_every_panel_opens(blender):
+    assert blender.run("panels", size=(1000, 1300))["panels"] > 15
+
+
 def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
     seen = blender.run("match_mask", size=(1100, 800))
     assert seen["many"][0] > seen["few"][0]

@@ -59,10 +59,11 @@ def _layers(obj: bpy.types.Object) -> list[tuple[bpy.types.Scene, bpy.types.View
 
 
 def _local_views(obj: bpy.types.Object) -> list[bpy.types.SpaceView3D]:
-    """The views that show only a choice of objects, `obj` among them."""
+    """The views that show only a choice of objects, `obj` among them; in Blender 4 its evaluated copy alone knows."""
+    known = (obj, obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
     areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
     views = [area.spaces.active for area in areas if area.type == "VIEW_3D"]
-    return [view for view in views if view.local_view and obj.local_view_get(view)]
+    return [view for view in views if view.local_view and any(one.local_view_get(view) for one in known)]
 
 
 def place(name: str, positions: NDArray[np.float32]) -> bool:

@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import armature, mesh, mirror, sides, vertex_groups
+from ..scene import armature, editable, mesh, mirror, sides, vertex_groups
 from ..scene.error import SceneError
 from .inputs import Body, Garment
 from .params import TransferParams
@@ -35,10 +35,8 @@ def target_problem(
         return f"{target.name} is source and target at once: pick another source or deselect it"
     if target.type != "MESH":
         return f"{target.name} is not a mesh: deselect it or convert it"
-    for data in (target, target.data):
-        if not data.is_editable:
-            origin = data.library.filepath if data.library else "another file"
-            return f"{target.name} is linked from {origin}: make it local or a library override with its mesh"
+    if lost := editable.problem(target):
+        return lost
     if not params.make_single_user:
         for other in (source, *targets):
             if other.data == target.data and other != target:

@@ -77,7 +77,7 @@ class TransferParams(Params):
                 "The shapes as they are posed and deformed now; what does not follow the pose yet is bound in it",
             ),
             "AS_SHOWN": (
-                "As Shown, in Rest Pose",
+                "As Shown, at Rest",
                 "The shapes with shape keys and modifiers, but not as they are posed",
             ),
         },
@@ -233,7 +233,7 @@ class TransferParams(Params):
     )
     replace_others: bool = setting(
         False,
-        "Replace Other Deformers",
+        "Replace Deformers",
         "End what else moves a target or overrules its weights: bone parents, constraints, other armatures, modifiers",
     )
     skip_failing: bool = setting(

@@ -75,7 +75,7 @@ def _let_weights_rule(body: Body, garment: Garment, names: list[str], params: Tr
             follower.end()
         return []
     return [
-        f"{target.name} {follower.phrase}: turn on Replace Other Deformers if the weights alone are to move it"
+        f"{target.name} {follower.phrase}: turn on Replace Deformers if the weights alone are to move it"
         for follower in found
     ]
 

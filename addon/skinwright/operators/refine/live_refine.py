@@ -40,7 +40,8 @@ class SKINWRIGHT_OT_live_refine(RefineSettings, SkinwrightOperator):
         others = [other for other in context.selected_objects if other.type == "MESH" and other != obj]
         garments = [other for other in others if armature.find(other) == rig]
         live.start(obj, garments, self.to_params(preferences.threads(context)))
-        return self.tell(f"{obj.name}: live refinement is on, {len(garments)} garments follow", [])
+        follow = "1 garment follows" if len(garments) == 1 else f"{len(garments)} garments follow"
+        return self.tell(f"{obj.name}: live refinement is on, {follow}", [])
 
 
 _busy = False
