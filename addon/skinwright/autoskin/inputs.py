@@ -60,6 +60,8 @@ def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Ob
         raise SceneError(
             f"{obj.name} has no armature to take bones from: select one too, or give it an Armature modifier"
         )
+    if rig.type != "ARMATURE":
+        raise SceneError(f"{rig.name} is no armature: name the armature whose bones the weights follow")
     if not armature.deform_bones(rig):
         raise SceneError(f"{rig.name} has no bone that deforms {obj.name}: turn Deform on for some")
     mesh.check_world(obj, rig)

@@ -7,11 +7,11 @@ from .error import SceneError
 
 def problem(obj: bpy.types.Object) -> str:
     """Why what is written to an object and its mesh would be lost when the file is opened again, or nothing."""
-    for data in (obj, obj.data):
+    for data in filter(None, (obj, obj.data)):
         if not data.is_editable:
             origin = data.library.filepath if data.library else "another file"
             return f"{obj.name} is linked from {origin}: make it local, or an override whose mesh is local"
-    if obj.data.override_library:
+    if obj.data and obj.data.override_library:
         return f"The mesh of {obj.name} is a library override, of which files keep no weights: make the mesh local"
     return ""
 

@@ -497,6 +497,100 @@ def long_work_and_files(window: Window) -> Steps:
     assert nothing_is_left(), modal()
 
 
+def a_second_window_in_long_work(window: Window) -> Steps:
+    yield from heavy(window)
+    part("jobs").running.cancel()
+    yield from until(lambda: part("jobs").running is None)
+    with window.context():
+        bpy.ops.wm.window_new()
+    yield 0.8
+    second = bpy.context.window_manager.windows[1]
+    area = max(second.screen.areas, key=lambda area: area.width * area.height)
+    area.type = "VIEW_3D"
+    yield 0.5
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=second, screen=second.screen, area=area, region=region):
+        assert bpy.ops.skinwright.transfer_weights("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    runner = part("jobs").running
+    yield 0.1
+    with window.context():
+        for name in ("transfer_weights", "sculpt_weights", "paint_match_mask", "desparsify", "live_refine"):
+            assert not getattr(bpy.ops.skinwright, name).poll(), f"{name} beside other work"
+    with bpy.context.temp_override(window=second, screen=second.screen, area=area, region=region):
+        bpy.ops.wm.window_close()
+    yield from until(lambda: len(bpy.context.window_manager.windows) == 1)
+    yield 0.5
+    assert part("jobs").running is None and runner.done and nothing_is_left(), modal()
+    assert not bpy.data.objects["Dress"].vertex_groups
+    with window.context():
+        assert bpy.ops.skinwright.transfer_weights.poll()
+
+
+def keys(name: str = "Limb") -> list[str]:
+    """Its shape keys, and whether a cache plays."""
+    obj = bpy.data.objects[name]
+    blocks = obj.data.shape_keys.key_blocks if obj.data.shape_keys else []
+    return [key.name for key in blocks] + [modifier.name for modifier in obj.modifiers]
+
+
+def baking_is_stopped_and_undone(window: Window) -> Steps:
+    yield from limb(window)
+    bare = keys()
+    folder = tempfile.mkdtemp()
+    path = os.path.join(folder, "limb.pc2")
+    for name, options in (("bake_correctives", {}), ("bake_refined_cache", {"filepath": path, "frame_end": 8})):
+        with window.context():
+            assert getattr(bpy.ops.skinwright, name)("INVOKE_DEFAULT", True, **options) == {"RUNNING_MODAL"}
+        window.key("ESC")
+        yield from until(lambda: part("jobs").running is None, 60)
+        yield 0.3
+        assert keys() == bare and not os.listdir(folder), "stopped, and something was written"
+        with window.context():
+            assert getattr(bpy.ops.skinwright, name)("INVOKE_DEFAULT", True, **options) == {"RUNNING_MODAL"}
+        yield from until(lambda: part("jobs").running is None, 120)
+        yield 0.4
+        baked = keys()
+        assert baked != bare, said()
+        remove = name.replace("bake", "remove")
+        operator(window, f"skinwright.{remove}")
+        window.event("MOUSEMOVE")
+        yield 0.3
+        assert [key for key in keys() if key != "Basis"] == bare, (keys(), bare)
+        window.key("Z", ctrl=True)
+        yield from until(lambda baked=baked: keys() == baked)
+        window.key("Z", ctrl=True)
+        yield from until(lambda: keys() == bare)
+
+
+def embedding_is_stopped_and_undone(window: Window) -> Steps:
+    armature, _, garment = dress.build(60_000, 4)
+    bpy.context.scene.skinwright.retarget.source = armature
+    garment.modifiers.clear()
+    garment.location.x = 1.5
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == garment)
+    bpy.context.view_layer.objects.active = garment
+    look(window)
+    operator(window, "ed.undo_push", message="Scene")
+    yield 0.3
+    names = sorted(obj.name for obj in bpy.data.objects)
+    with window.context():
+        assert bpy.ops.skinwright.embed_armature("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    window.key("ESC")
+    yield from until(lambda: part("jobs").running is None, 60)
+    yield 0.3
+    assert sorted(obj.name for obj in bpy.data.objects) == names
+    with window.context():
+        assert bpy.ops.skinwright.embed_armature("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    yield from until(lambda: part("jobs").running is None, 120)
+    yield 0.4
+    assert len(bpy.data.objects) == len(names) + 1, said()
+    window.event("MOUSEMOVE")
+    window.key("Z", ctrl=True)
+    yield from until(lambda: sorted(obj.name for obj in bpy.data.objects) == names)
+    assert not bpy.data.objects["Dress"].modifiers and bpy.data.objects["Dress"].parent is None
+
+
 def disabled_in_long_work(window: Window) -> Steps:
     yield from heavy(window)
     runner, timers = part("jobs").running, part("operators.modal.timers")._running
@@ -555,6 +649,9 @@ SCENARIOS = (
     a_preview_that_loses_its_objects,
     disabled_while_painting,
     long_work_and_files,
+    a_second_window_in_long_work,
+    baking_is_stopped_and_undone,
+    embedding_is_stopped_and_undone,
     disabled_in_long_work,
     linked_and_overridden,
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Context, Event, Object
 
+from ... import jobs
 from ...scene import identity
 
 
@@ -113,7 +114,10 @@ _begun: set[int] = set()
 
 
 def refusal() -> str:
-    """Why nothing else may write weights now, or nothing: it would pull the ground from under the session."""
+    """Why nothing else may write weights now, or nothing: it would pull the ground from under a session, or under work
+    that goes on in another window."""
+    if jobs.running:
+        return "Other work goes on: wait for its end, or stop it with Esc in its window"
     if current is None or current.orphaned:
         return ""
     return f"{current.label} runs on {current.object.name}: keep or cancel it first"
