@@ -122,7 +122,8 @@ def run(blender: Blender, wine: str, wheel: Path, tests: list[str]) -> int:
 def compare_bits(python: list[str], environment: dict[str, str]) -> int:
     """Print how many results have the bits of this machine's module; returns 1 if one differs."""
     script = "blender_scripts/bits.py"
-    quiet: dict[str, Any] = {"cwd": ROOT, "stdin": subprocess.DEVNULL, "encoding": "utf-8"}  # wine takes no closed stream
+    # wine takes no closed stream
+    quiet: dict[str, Any] = {"cwd": ROOT, "stdin": subprocess.DEVNULL, "encoding": "utf-8"}
     there = subprocess.check_output([*python, script], env=environment, **quiet).splitlines()
     here = subprocess.check_output([sys.executable, script], **quiet).splitlines()
     differing = sorted(set(there) ^ set(here))
