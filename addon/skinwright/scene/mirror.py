@@ -23,9 +23,9 @@ class Reflection:
 
 
 def before_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
-    """The Mirror modifiers that are on and come before the armature, whose halves the weights are to move."""
+    """The Mirror modifiers before the armature, on in the viewport or in renders: weights are to move their halves."""
     posed = _of_the_pose(obj)
-    return [m for m in modifiers.shown(obj) if m.type == "MIRROR" and m not in posed]
+    return [m for m in modifiers.used(obj) if m.type == "MIRROR" and m not in posed]
 
 
 def after_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
