@@ -31,7 +31,8 @@ def state(name: str = "Body") -> tuple:
 
 
 def modal() -> list[str]:
-    return [operator.bl_idname for window in bpy.context.window_manager.windows for operator in window.modal_operators]
+    windows = bpy.context.window_manager.windows
+    return [operator.bl_idname for window in windows for operator in window.modal_operators if operator]
 
 
 def nothing_is_left() -> bool:

@@ -5,7 +5,7 @@ from bpy.app.handlers import load_post, load_post_fail, load_pre, persistent, sa
 
 from ... import reporting
 from ...scene import modes
-from . import brush_session, ending, status
+from . import brush_session, ending, held_input, status
 from .brush_session import BrushSession
 from .ending import Ending
 
@@ -39,8 +39,7 @@ def _watch() -> float | None:
     session = brush_session.current
     if session is None:
         return None
-    running = {operator.bl_idname for window in _windows() for operator in window.modal_operators}
-    if _class_name(session) not in running:
+    if _class_name(session) not in held_input.running(bpy.context):
         orphan(session)
     return _WATCH_SECONDS
 
