@@ -98,6 +98,11 @@ impl<'b> SparseColumns<'b> {
         Self { columns, rows, least }
     }
 
+    fn minimum(&self) -> f64 {
+        let noticeable = self.rows.values().filter(|value| value.abs() >= self.least);
+        noticeable.fold(f64::INFINITY, f64::min)
+    }
+
     fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let noticeable = self.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
         noticeable.map(|(slot, value)| (self.columns[slot as usize], value))
@@ -125,6 +130,15 @@ impl<'b> BlockRows<'b> {
         let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
         std::iter::zip(self.columns.iter().copied(), values)
             .chain(sparse.iter().flat_map(move |columns| columns.row(k)))
+    }
+
+    /// The smallest value of the block's `count` unknowns.
+    pub fn minimum(&self, count: usize) -> f64 {
+        if let Values::Sparse(rows, _) = &self.values {
+            return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min);
+        }
+        let least = |k| self.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+        (0..count).into_par_iter().with_min_len(256).map(least).reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Backward error of the solve.

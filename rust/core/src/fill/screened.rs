@@ -29,7 +29,7 @@ use crate::progress::Progress;
 /// a: how much shorter the two smoothing solves reach than the wanted energy. From 1.25 to 2.5 figures are alike.
 const REACH: f64 = 1.5;
 /// Magnitude that counts as zero between solves.
-const NEGLIGIBLE: f64 = 1e-7;
+const NEGLIGIBLE: f64 = 1e-6;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 

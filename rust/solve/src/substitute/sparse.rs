@@ -166,6 +166,11 @@ impl<'f> Layout<'f> {
 pub type Term<'a, 'f> = (&'a SparseRows<'f>, &'a (dyn Fn(usize) -> f64 + Sync));
 
 impl SparseRows<'_> {
+    /// All values that are stored, and some zeros.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.fronts.iter().flat_map(|rows| &rows.values).copied()
+    }
+
     /// Columns and values of one unknown, by column, without those that are not stored.
     pub fn row(&self, unknown: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let (front, row) = match self.tree {
