@@ -33,6 +33,10 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
+/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+const MANY: usize = 300_000;
+const FEWER_COLUMNS: usize = 16;
+
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
 
@@ -83,7 +87,8 @@ pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress)
         let group = Group { screened: &screened, columns, places: &places, first, solver, progress };
         group.solve().map(|found| SparseColumns::new(columns.to_vec(), found, LEAST))
     };
-    let groups = std::iter::zip((0..).step_by(MOST_COLUMNS), columns.chunks(MOST_COLUMNS));
+    let together = if block.unknowns().len() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
+    let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
     let found = groups.map(solve).collect::<Result<_>>()?;
     Ok(BlockRows::sparse(found, accuracy))
 }
