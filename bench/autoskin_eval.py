@@ -20,6 +20,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import bpy
 import numpy as np
+import raster
 import rigged
 import skinwright_native as native
 from rigged import Rigged
@@ -148,30 +149,28 @@ def draw(cases: list[tuple[Rigged, str, np.ndarray, np.ndarray]], path: Path) ->
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
-    from matplotlib.collections import PolyCollection
 
     figure, axes = pyplot.subplots(len(cases), 3, figsize=(12, 4.2 * len(cases)), squeeze=False)
     for row, (body, name, mine, theirs) in zip(axes, cases, strict=True):
         pose = pose_of(body, POSES[name])
         reference = posed(body, body.weights, pose)
+        camera = raster.Camera.around(reference, np.eye(3), (440, 462))
         for axis, title, weights in zip(
             row, ("artist", "Skinwright", "Blender"), (body.weights, mine, theirs), strict=True
         ):
             points = posed(body, weights, pose)
-            faces = points[body.triangles]
-            off = np.linalg.norm(points - reference, axis=1)[body.triangles].mean(axis=1) / body.height
-            normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-            light = np.clip(normal @ [0.3, 0.5, 0.8] / np.maximum(np.linalg.norm(normal, axis=1), 1e-12), 0.1, 1)
-            share = np.clip(off / 0.03, 0, 1)
-            colour = np.column_stack([light, light * (1 - share), light * (1 - share)])
-            order = np.argsort(faces[:, :, 2].mean(axis=1))
-            axis.add_collection(PolyCollection(faces[order][:, :, :2], facecolors=colour[order], edgecolors="none"))
-            axis.autoscale()
-            axis.set_aspect("equal")
+            off = np.linalg.norm(points - reference, axis=1)[:, None] / body.height
+            axis.imshow(raster.picture(camera, points, body.triangles, off, reddened))
             axis.axis("off")
             axis.set_title(f"{title}: {body.name}, {name}", fontsize=8)
     figure.tight_layout()
     figure.savefig(path, dpi=110)
+
+
+def reddened(off: np.ndarray) -> np.ndarray:
+    """Grey where skin lies right, red where it is off by 3 % of the height (n, 3)."""
+    share = np.clip(off / 0.03, 0, 1)
+    return (1 - share) * np.array([0.85, 0.85, 0.85]) + share * np.array([0.85, 0.05, 0.05])
 
 
 def main() -> None:

@@ -130,10 +130,16 @@ def makehuman_table(wheel: Path, out: Path) -> list[str]:
                 views[-1].append(_colored(case, name, points))
                 if name == "skeleton":
                     for pose, errors in deformation(case, weights).items():
-                        worst.append((np.percentile(errors, 95), pair.name, pose, case, weights))
+                        worst.append((np.percentile(errors, 95), f"{pair.name}, {mesh}", pose, case, weights))
     source = pairs[0].source
-    own = picture.View("source", source.positions, source.triangles,
-                       picture.place_colors(source.positions, source.positions), picture.axes_of(True))  # fmt: skip
+    own = picture.View(
+        "source",
+        source.positions,
+        source.triangles,
+        source.positions,
+        picture.place_colors(source.positions),
+        picture.axes_of(True),
+    )
     picture.save([[own, *row] for row in views[::2]], out / "retarget_colors.png")
     _save_worst(worst, out)
     return rows
@@ -150,8 +156,8 @@ def _row(ruler: Ruler, pair: Pair, mesh: str, method: str, weights, points, seco
 
 
 def _colored(pair: Pair, title: str, points: np.ndarray) -> picture.View:
-    colors = picture.place_colors(points, pair.source.positions)
-    return picture.View(title, pair.target.positions, pair.target.triangles, colors, picture.axes_of(True))
+    color = picture.place_colors(pair.source.positions)
+    return picture.View(title, pair.target.positions, pair.target.triangles, points, color, picture.axes_of(True))
 
 
 def _save_worst(worst: list, out: Path) -> None:
@@ -161,13 +167,15 @@ def _save_worst(worst: list, out: Path) -> None:
         matrices = posed(pair.target, POSES[pose])
         half = 0.5 * np.abs(weights - pair.truth).sum(1)
         views = []
-        for title, rows_of, colors in (
-            (f"{name}, {pose}: true", pair.truth, np.full((len(half), 3), 0.8)),
-            (f"retargeted, p95 {error:.1f} per mille", weights, np.full((len(half), 3), 0.8)),
-            ("half L1, red from 0.5", weights, picture.error_colors(half)),
+        for title, rows_of, color in (
+            (f"{name}, {pose}: true", pair.truth, picture.grey),
+            (f"retargeted, p95 {error:.1f} per mille", weights, picture.grey),
+            ("half L1, red from 0.5", weights, picture.error_colors),
         ):
             positions = characters.skinned(pair.target.positions, rows_of, matrices)
-            views.append(picture.View(title, positions, pair.target.triangles, colors, picture.axes_of(True)))
+            views.append(
+                picture.View(title, positions, pair.target.triangles, half[:, None], color, picture.axes_of(True))
+            )
         rows.append(views)
     picture.save(rows, out / "retarget_worst.png")
 

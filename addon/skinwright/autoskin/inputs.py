@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, mesh, mirror, rest_bones, sculpting, shapes, sides, symmetry, vertex_groups
+from ..scene import armature, editable, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import completion, merging
@@ -54,7 +54,7 @@ def read(objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, para
 
 
 def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Object:
-    sculpting.check_editable(obj)
+    editable.check(obj)
     rig = rig or armature.find(obj)
     if rig is None:
         raise SceneError(

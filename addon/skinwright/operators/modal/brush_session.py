@@ -107,6 +107,9 @@ current: BrushSession | None = None
 ended: BrushSession | None = None
 
 FLAGS = ("sculpting", "painting")
+# The objects of all sessions in this file, by Blender's number. A copy made during one, and what comes from another
+# file, may bear a mark as well, which means nothing.
+_begun: set[int] = set()
 
 
 def refusal() -> str:
@@ -116,6 +119,40 @@ def refusal() -> str:
     return f"{current.label} runs on {current.object.name}: keep or cancel it first"
 
 
+def begin(session: BrushSession) -> None:
+    """The session runs from now on; its object has no mark yet."""
+    global current
+    unmark(marked())
+    _begun.add(session.object.uid)
+    current = session
+
+
+def end(session: BrushSession) -> None:
+    """No session runs, and what undo leads to belongs to the one that ran last."""
+    global current, ended
+    current, ended = None, session
+
+
+def forget() -> None:
+    """Another file: none of its objects has been in a session."""
+    global current, ended
+    current = ended = None
+    _begun.clear()
+
+
+def marked() -> list[Object]:
+    """The objects with a session's mark, whether or not it means anything."""
+    return [obj for obj in bpy.data.objects if any(getattr(obj.skinwright, flag) for flag in FLAGS)]
+
+
 def flagged() -> list[Object]:
     """The objects in a state within a session."""
-    return [obj for obj in bpy.data.objects if any(getattr(obj.skinwright, flag) for flag in FLAGS)]
+    return [obj for obj in marked() if obj.session_uid in _begun]
+
+
+def unmark(objects: list[Object]) -> None:
+    """Take the marks away."""
+    for obj in objects:
+        for flag in FLAGS:
+            if getattr(obj.skinwright, flag):
+                setattr(obj.skinwright, flag, False)

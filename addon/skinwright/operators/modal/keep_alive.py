@@ -81,7 +81,7 @@ def _view(window: bpy.types.Window) -> bpy.types.Area | None:
 def _forget() -> None:
     if brush_session.current:
         brush_session.current.forget()
-    brush_session.current = brush_session.ended = None
+    brush_session.forget()
 
 
 @persistent
@@ -104,12 +104,12 @@ def _after_load(*_arguments: object) -> None:
     _forget()
     reporting.forget()
     status.clear()
-    if brush_session.flagged():
+    marked = brush_session.marked()
+    if marked:
         text = "The file was saved while weights were sculpted or painted: they are as they were then"
         reporting.remember("Skinwright", text)
-    for obj in brush_session.flagged():
-        for flag in brush_session.FLAGS:
-            setattr(obj.skinwright, flag, False)
+    brush_session.unmark(marked)
+    for obj in marked:
         if obj.mode in ("SCULPT", "WEIGHT_PAINT"):
             modes.go_to(obj, "OBJECT")
     # The overlay of a match needs what was prepared for it, which no file holds.
@@ -128,7 +128,7 @@ def _before_save(*_arguments: object) -> None:
         return
     under_brush = obj.mode == session.mode
     _saving = session, under_brush
-    session.set_flag(False)
+    brush_session.unmark(brush_session.marked())
     session.tidy()
     if under_brush:
         modes.go_to(obj, "OBJECT")
