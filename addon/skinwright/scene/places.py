@@ -58,8 +58,14 @@ def _keys(points: NDArray[np.float32], cell: float, shift: float | NDArray[np.fl
 
 def nearest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> NDArray[np.float64]:
     """(n,) how far each query (n, 3) is from the closest of the points (m, 3)."""
+    return closest(points, queries)[1]
+
+
+def closest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(n,) the closest of the points (m, 3) to each query (n, 3), and how far it is."""
     tree = KDTree(len(points))
     for number, point in enumerate(points.tolist()):
         tree.insert(point, number)
     tree.balance()
-    return np.array([tree.find(query)[2] for query in queries.tolist()], np.float64)
+    found = [tree.find(query)[1:] for query in queries.tolist()]
+    return np.array([index for index, _ in found], np.int64), np.array([distance for _, distance in found], np.float64)

@@ -77,6 +77,10 @@ def _armature(obj: bpy.types.Object) -> bpy.types.Object:
     if len(rigs) > 1:
         names = " and ".join(sorted(rig.name for rig in rigs))
         raise SceneError(f"{obj.name} is deformed by {names} at once: hide all Armature modifiers but those of one")
+    if acting and scene_armature.deforms_as_parent(obj):
+        raise SceneError(
+            f"{obj.name} is deformed by {obj.parent.name} too, as its child: set the parent's type to Object"
+        )
     rig = scene_armature.find(obj)
     if rig is None:
         raise SceneError(f"{obj.name} has no Armature modifier, so no weights to sculpt: give it one")

@@ -29,7 +29,7 @@ def warning(garment: Garment) -> str:
     if len(one) < _FEWEST:
         return ""
     rows = vertex_groups.read(garment.object, garment.names)
-    apart = _difference(rows, one, other) > _COMES_APART
+    apart = csr.differences(csr.take_rows(rows, one), csr.take_rows(rows, other)) > _COMES_APART
     if int(apart.sum()) < _FEWEST:
         return ""
     weld = 1.1 * float(gaps[apart].max()) / diagonal
@@ -55,12 +55,3 @@ def _pairs(
     found = [pair for pair in found if pair[2] > 0]
     one, other, gaps = (np.array(column) for column in zip(*found, strict=True)) if found else (np.zeros(0),) * 3
     return border[one.astype(np.int64)], border[other.astype(np.int64)], gaps.astype(np.float64)
-
-
-def _difference(rows: csr.Rows, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(n,) half the sum of the differences of two rows each."""
-    a, b = csr.take_rows(rows, one), csr.take_rows(rows, other)
-    pair = np.concatenate([csr.entry_vertices(a), csr.entry_vertices(b)])
-    bones = np.concatenate([a.bones, b.bones])
-    both = csr.from_entries(pair, bones, np.concatenate([a.values, -b.values]), len(one))
-    return csr.row_sums(both._replace(values=np.abs(both.values))) / 2

@@ -11,16 +11,12 @@ from numpy.typing import NDArray
 from .. import csr
 from ..csr import Rows
 from ..reporting import GarmentReport
-from ..scene import armature, binding, followers, mesh, places, smoothing, vertex_groups
-from . import near_borders
+from ..scene import armature, binding, followers, mesh, smoothing, vertex_groups
+from . import afterwards
 from .checks import garment_warnings
 from .compute import Result
 from .inputs import Body, Garment
 from .params import TransferParams
-
-# Of a target, to see whether it lies over a hidden part of the body; and the share of it that is worth a word.
-_MOST_POINTS = 2000
-_MUCH = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,9 +54,7 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
     vertex_groups.write(target, names, rows, vertices)
     vertex_groups.ensure(target, sorted({body.opposite.get(name, name) for name in names} & set(body.bones)))
     warnings += _let_weights_rule(body, garment, names, params)
-    warnings += _short_rows(garment, vertices)
-    warnings += _over_hidden(body, planned)
-    warnings += [sentence for sentence in [near_borders.warning(garment)] if sentence]
+    warnings += afterwards.warnings(body, garment, result)
     attached = params.add_armature and bool(body.rigs) and not armature.follows_any(target, body.rigs)
     if attached:
         armature.attach(target, body.object)
@@ -83,40 +77,6 @@ def _let_weights_rule(body: Body, garment: Garment, names: list[str], params: Tr
     return [
         f"{target.name} {follower.phrase}: turn on Replace Deformers if the weights alone are to move it"
         for follower in found
-    ]
-
-
-def _short_rows(garment: Garment, vertices: NDArray[np.integer]) -> list[str]:
-    """Vertices that follow nothing but locked bones, which the lock keeps from them."""
-    if not garment.held.any():
-        return []
-    sums = csr.row_sums(vertex_groups.read(garment.object, garment.names))[vertices]
-    short = int((sums < 1 - 1e-3).sum())
-    if not short:
-        return []
-    locked = ", ".join(sorted(garment.locks & set(garment.names)))
-    return [
-        f"The weights of {short} vertices of {garment.object.name} sum to less than 1, as they would follow locked "
-        f"groups: unlock {locked}"
-    ]
-
-
-def _over_hidden(body: Body, planned: Plan) -> list[str]:
-    """Vertices next to a part of the body that a Mask modifier hides, often because a garment covers it."""
-    if body.hidden is None:
-        return []
-    garment, (mask, hidden) = planned.garment, body.hidden
-    n = len(garment.shape.geometry.positions)
-    some = np.unique(np.linspace(0, n - 1, min(n, _MOST_POINTS)).astype(np.int64))
-    points = garment.shape.geometry.positions[some]
-    reach = float(planned.result.report.get("max_distance") or 0.05 * np.linalg.norm(body.geometry.size))
-    there, here = (places.nearest(surface, points) for surface in (hidden, body.geometry.positions))
-    share = float(((there < reach) & (there < here)).mean())
-    if share < _MUCH:
-        return []
-    return [
-        f"{share:.0%} of {garment.object.name} lies next to what {mask} hides, where nothing can match: "
-        "turn it off in the viewport for the transfer if this is the skin below"
     ]
 
 

@@ -34,9 +34,10 @@ use glam::Vec3;
 
 use accuracy::{backward_error, defect};
 use fronts::multifrontal::Multifrontal;
+pub use substitute::forward::MOST_COLUMNS;
 pub use substitute::solution::{RightHandSides, Solution};
 use substitute::sparse::Layout;
-pub use substitute::sparse::{MOST_COLUMNS, SparseRows, Term};
+pub use substitute::sparse::{SparseRows, Term};
 use supernodal::Supernodal;
 
 /// Lower triangle (diagonal included) of a symmetric matrix, compressed by column, rows ascending.
@@ -333,8 +334,7 @@ mod tests {
         let near = sparse.solve(&data, |_| 1e-9, &NEVER);
         let mut stored = 0;
         for i in 0..20_000 {
-            let mut row = Vec::new();
-            near.append_row(i, &mut row);
+            let row: Vec<(u32, f64)> = near.row(i).collect();
             let value: f64 = row.iter().map(|&(_, value)| value).sum();
             assert!(row.iter().all(|&(column, _)| column == 37));
             assert!((value - whole.row(i).next().unwrap()).abs() <= 1e-9);
@@ -358,9 +358,8 @@ mod tests {
             let data = sparse.sum(&[(&data, &|_| 1.0), (&data, &|_| 2.0)]);
             let found = sparse.solve(&data, |_| 0.0, &NEVER);
             for i in 0..n {
-                let (mut row, mut wanted) = (Vec::new(), whole.row(i).collect::<Vec<f64>>());
-                found.append_row(i, &mut row);
-                row.iter().for_each(|&(column, value)| wanted[column as usize] -= value);
+                let mut wanted: Vec<f64> = whole.row(i).collect();
+                found.row(i).for_each(|(column, value)| wanted[column as usize] -= value);
                 assert!(wanted.iter().all(|difference| difference.abs() < 1e-12), "{i}");
             }
         }

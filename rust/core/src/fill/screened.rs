@@ -19,7 +19,7 @@
 
 use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver};
 
-use super::block::{Block, BlockRows, Places};
+use super::block::{Block, BlockRows, Places, SparseColumns};
 use super::rows::Ragged;
 use crate::adjacency::NONE;
 use crate::error::Result;
@@ -29,9 +29,13 @@ use crate::progress::Progress;
 /// a: how much shorter the two smoothing solves reach than the wanted energy. From 1.25 to 2.5 figures are alike.
 const REACH: f64 = 1.5;
 /// Magnitude that counts as zero between solves.
-const NEGLIGIBLE: f64 = 1e-7;
+const NEGLIGIBLE: f64 = 1e-6;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
+
+/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+const MANY: usize = 300_000;
+const FEWER_COLUMNS: usize = 16;
 
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
@@ -79,28 +83,14 @@ pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress)
     let columns = screened.columns();
     let places = Places::of(&columns).of_column;
     let solver = block.factor.sparse();
-    let solve = |(first, columns)| {
+    let solve = |(first, columns): (usize, &[u32])| {
         let group = Group { screened: &screened, columns, places: &places, first, solver, progress };
-        group.solve().map(|found| (columns, found))
+        group.solve().map(|found| SparseColumns::new(columns.to_vec(), found, LEAST))
     };
-    let groups = std::iter::zip((0..).step_by(MOST_COLUMNS), columns.chunks(MOST_COLUMNS));
-    let found: Vec<(&[u32], SparseRows<'_>)> = groups.map(solve).collect::<Result<_>>()?;
-    let append = |k: usize, out: &mut Vec<(u32, f64)>| {
-        for (columns, rows) in &found {
-            let start = out.len();
-            rows.append_row(k, out);
-            let mut end = start;
-            for at in start..out.len() {
-                let (slot, value) = out[at];
-                if value.abs() >= LEAST {
-                    out[end] = (columns[slot as usize], value);
-                    end += 1;
-                }
-            }
-            out.truncate(end);
-        }
-    };
-    Ok(BlockRows::sparse(Ragged::new(block.unknowns().len(), append), accuracy))
+    let together = if block.unknowns().len() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
+    let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
+    let found = groups.map(solve).collect::<Result<_>>()?;
+    Ok(BlockRows::sparse(found, accuracy))
 }
 
 impl<'a> Screened<'a> {
@@ -170,20 +160,20 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
 }
 
 /// A few columns of a block.
-struct Group<'a> {
+struct Group<'a, 'b> {
     screened: &'a Screened<'a>,
     columns: &'a [u32],
     /// Place of every column among the block's.
     places: &'a [u32],
     /// The place of the group's first column.
     first: usize,
-    solver: SparseSolver<'a>,
+    solver: SparseSolver<'b>,
     progress: &'a Progress,
 }
 
-impl<'a> Group<'a> {
+impl<'b> Group<'_, 'b> {
     /// Values of the unknowns.
-    fn solve(&self) -> Result<SparseRows<'a>> {
+    fn solve(&self) -> Result<SparseRows<'b>> {
         let Screened { confidence, mass, least_ratio, .. } = self.screened;
         let solver = self.solver;
         let (given, added) =
@@ -204,7 +194,7 @@ impl<'a> Group<'a> {
         self.substitute(&corrected, |_| LEAST)
     }
 
-    fn substitute(&self, rows: &SparseRows<'a>, least: impl Fn(usize) -> f64 + Sync) -> Result<SparseRows<'a>> {
+    fn substitute(&self, rows: &SparseRows<'b>, least: impl Fn(usize) -> f64 + Sync) -> Result<SparseRows<'b>> {
         let found = self.solver.solve(rows, least, self.progress.stop());
         self.progress.check().map(|()| found)
     }

@@ -37,12 +37,17 @@ impl Active {
         Self { mask, width: (mask.count_ones() as usize).next_multiple_of(BLOCK), in_places: 0 }
     }
 
-    /// The columns stored.
-    pub(crate) fn columns(&self) -> Vec<usize> {
-        if self.in_places > 0 {
-            return (0..self.in_places).collect();
-        }
-        (0..u64::BITS as usize).filter(|column| self.mask >> column & 1 == 1).collect()
+    /// The columns stored, ascending.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut left = match self.in_places {
+            0 => self.mask,
+            count => u64::MAX >> (MOST_COLUMNS - count),
+        };
+        std::iter::from_fn(move || {
+            let column = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (column < MOST_COLUMNS).then_some(column)
+        })
     }
 
     /// Where `column` is stored.
@@ -51,8 +56,36 @@ impl Active {
     }
 
     /// Where the columns of `other`, which are among these, are stored.
-    pub(crate) fn slots(&self, other: &Self) -> Vec<usize> {
-        other.columns().into_iter().map(|column| self.slot(column)).collect()
+    pub(crate) fn slots(&self, other: &Self) -> Slots {
+        Slots::of(other.columns().map(|column| self.slot(column)))
+    }
+}
+
+/// Columns that one pass can have: a bit each in a word.
+pub const MOST_COLUMNS: usize = u64::BITS as usize;
+
+/// A short list of columns or of their slots: there is one for nearly every front and pass.
+pub(crate) struct Slots {
+    slots: [usize; MOST_COLUMNS],
+    count: usize,
+}
+
+impl Slots {
+    pub(crate) fn of(list: impl Iterator<Item = usize>) -> Self {
+        let mut slots = Self { slots: [0; MOST_COLUMNS], count: 0 };
+        for slot in list {
+            slots.slots[slots.count] = slot;
+            slots.count += 1;
+        }
+        slots
+    }
+}
+
+impl std::ops::Deref for Slots {
+    type Target = [usize];
+
+    fn deref(&self) -> &[usize] {
+        &self.slots[..self.count]
     }
 }
 
@@ -139,7 +172,7 @@ impl<G: Given> Visit for ForwardPass<'_, G> {
                 let mut y = vec![0.0; front.columns * active.width];
                 self.given.put(index, active, &mut y);
                 self.front(index, &mut y, passed, &received);
-                let kept = active.columns();
+                let kept = Slots::of(active.columns());
                 for (x, y) in x.chunks_exact_mut(width).zip(y.chunks_exact(active.width)) {
                     kept.iter().zip(y).for_each(|(&column, &value)| x[column] = value);
                 }

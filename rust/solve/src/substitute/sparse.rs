@@ -13,11 +13,9 @@ use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::Tree;
 use crate::substitute::backward::Arithmetic;
-use crate::substitute::forward::{Active, Given, activity, forward};
+use crate::substitute::forward::{Active, Given, MOST_COLUMNS, activity, forward};
 use crate::substitute::solution::RightHandSides;
 
-/// Columns that rows may have: one bit each in a word.
-pub const MOST_COLUMNS: usize = u64::BITS as usize;
 /// Subtrees with more columns than this are divided between threads.
 const FORK_COLUMNS: usize = 1000;
 
@@ -68,17 +66,19 @@ impl FrontRows {
         let mut seen = [false; MOST_COLUMNS];
         for (k, row) in self.rows().enumerate() {
             let least = least(k);
-            seen.iter_mut().zip(row).for_each(|(seen, value)| *seen |= value.abs() > least);
+            for (seen, row) in seen.as_chunks_mut::<BLOCK>().0.iter_mut().zip(row.as_chunks::<BLOCK>().0) {
+                seen.iter_mut().zip(row).for_each(|(seen, value)| *seen |= value.abs() > least);
+            }
         }
-        let kept = |&column: &usize| seen[active.slot(column)];
-        let mask = active.columns().into_iter().filter(kept).fold(0, |mask, column| mask | 1 << column);
+        let kept = active.columns().zip(seen).filter(|&(_, seen)| seen);
+        let mask = kept.fold(0, |mask, (column, _)| mask | 1 << column);
         if mask == self.mask {
             return self;
         }
         let (mut pruned, slots) = (Self::zeroed(mask, self.count), active.slots(&Active::of(mask)));
         let width = Active::of(mask).width.max(1);
         for (target, row) in pruned.values.chunks_exact_mut(width).zip(self.rows()) {
-            target.iter_mut().zip(&slots).for_each(|(target, &slot)| *target = row[slot]);
+            target.iter_mut().zip(&*slots).for_each(|(target, &slot)| *target = row[slot]);
         }
         pruned
     }
@@ -110,24 +110,24 @@ impl<'f> Layout<'f> {
 
     /// Rows made of what `append` adds to the list for each unknown: columns and values, those of equal columns to be summed.
     pub(crate) fn collect(self, append: impl Fn(usize, &mut Vec<(u32, f64)>) + Sync) -> SparseRows<'f> {
-        let rows = |front: usize| {
+        let rows = |(entries, ends): &mut (Vec<(u32, f64)>, Vec<usize>), front: usize| {
             let places = self.places(front);
-            let (mut entries, mut ends) = (Vec::new(), Vec::with_capacity(places.len()));
+            (entries.clear(), ends.clear());
             for place in places.clone() {
-                append(self.unknown(place), &mut entries);
+                append(self.unknown(place), entries);
                 ends.push(entries.len());
             }
             let mask = entries.iter().fold(0, |mask, &(column, _)| mask | 1 << column);
             let (mut rows, active) = (FrontRows::zeroed(mask, places.len()), Active::of(mask));
             let mut start = 0;
-            for (row, end) in rows.values.chunks_exact_mut(active.width.max(1)).zip(ends) {
-                entries[start..end].iter().for_each(|&(column, value)| row[active.slot(column as usize)] += value);
-                start = end;
+            for (row, end) in rows.values.chunks_exact_mut(active.width.max(1)).zip(ends.iter()) {
+                entries[start..*end].iter().for_each(|&(column, value)| row[active.slot(column as usize)] += value);
+                start = *end;
             }
             rows
         };
-        let fronts = (0..self.front_count()).into_par_iter().with_min_len(4).map(rows).collect();
-        SparseRows { tree: self.tree, fronts }
+        let fronts = (0..self.front_count()).into_par_iter().with_min_len(16);
+        SparseRows { tree: self.tree, fronts: fronts.map_init(Default::default, rows).collect() }
     }
 
     /// The sum of `terms`, each with a factor for every unknown.
@@ -166,8 +166,13 @@ impl<'f> Layout<'f> {
 pub type Term<'a, 'f> = (&'a SparseRows<'f>, &'a (dyn Fn(usize) -> f64 + Sync));
 
 impl SparseRows<'_> {
-    /// Appends columns and values of one unknown to `out`, by column, without those that are not stored.
-    pub fn append_row(&self, unknown: usize, out: &mut Vec<(u32, f64)>) {
+    /// All values that are stored, and some zeros.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.fronts.iter().flat_map(|rows| &rows.values).copied()
+    }
+
+    /// Columns and values of one unknown, by column, without those that are not stored.
+    pub fn row(&self, unknown: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let (front, row) = match self.tree {
             None => (0, unknown),
             Some(tree) => {
@@ -177,23 +182,16 @@ impl SparseRows<'_> {
             }
         };
         let FrontRows { mask, values, .. } = &self.fronts[front];
-        let (mut left, width) = (*mask, Active::of(*mask).width);
-        for value in values[row * width..].iter().take(mask.count_ones() as usize) {
-            out.push((left.trailing_zeros(), *value));
-            left &= left - 1;
-        }
+        let active = Active::of(*mask);
+        active.columns().map(|column| column as u32).zip(values[row * active.width..].iter().copied())
     }
-}
 
-impl SparseRows<'_> {
     /// The same with zeros, in the order of the columns, of `n` unknowns.
     pub(crate) fn to_dense(&self, n: usize) -> RightHandSides {
         let columns = self.fronts.iter().map(|rows| 64 - rows.mask.leading_zeros()).max().unwrap_or(0) as usize;
-        let (mut values, mut row) = (vec![0.0; n * columns], Vec::new());
+        let mut values = vec![0.0; n * columns];
         for (k, target) in values.chunks_exact_mut(columns.max(1)).enumerate() {
-            row.clear();
-            self.append_row(k, &mut row);
-            row.iter().for_each(|&(column, value)| target[column as usize] = value);
+            self.row(k).for_each(|(column, value)| target[column as usize] = value);
         }
         RightHandSides::dense(n, columns, values)
     }
@@ -329,12 +327,14 @@ impl Backward<'_> {
 
     /// The columns in which the solution around the subtree of `child` is not negligible.
     fn noticeable(&self, child: usize, parent: &Solved) -> u64 {
-        let mut largest = [0.0_f64; MOST_COLUMNS];
-        for row in self.rows_under(child, parent) {
-            largest.iter_mut().zip(row).for_each(|(largest, value)| *largest = largest.max(value.abs()));
-        }
         let least = self.subtree_least[child];
-        let columns = parent.active.columns().into_iter().zip(largest).filter(|&(_, largest)| largest > least);
+        let mut seen = [false; MOST_COLUMNS];
+        for row in self.rows_under(child, parent) {
+            for (seen, row) in seen.as_chunks_mut::<BLOCK>().0.iter_mut().zip(row.as_chunks::<BLOCK>().0) {
+                seen.iter_mut().zip(row).for_each(|(seen, value)| *seen |= value.abs() > least);
+            }
+        }
+        let columns = parent.active.columns().zip(seen).filter(|&(_, seen)| seen);
         columns.fold(0, |mask, (column, _)| mask | 1 << column)
     }
 
@@ -350,7 +350,7 @@ impl Backward<'_> {
             if active.mask == parent.active.mask {
                 target.copy_from_slice(row);
             } else {
-                target.iter_mut().zip(&slots).for_each(|(target, &slot)| *target = row[slot]);
+                target.iter_mut().zip(&*slots).for_each(|(target, &slot)| *target = row[slot]);
             }
         }
         boundary

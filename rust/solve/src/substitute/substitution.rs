@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::fronts::blocks::{BLOCK, panel_len};
 use crate::fronts::tree::{Front, Tree};
-use crate::substitute::forward::{Active, Given};
+use crate::substitute::forward::{Active, Given, Slots};
 use crate::substitute::solution::RightHandSides;
 
 /// Work of a front (multiplications) worth a second thread.
@@ -55,7 +55,7 @@ impl Given for ColumnsByFront<'_> {
     }
 
     fn put(&self, front: usize, active: Active, y: &mut [f64]) {
-        let kept = active.columns();
+        let kept = Slots::of(active.columns());
         for (y, &unknown) in y.chunks_exact_mut(active.width).zip(self.unknowns(front)) {
             match self.columns.row(unknown as usize) {
                 None => {}

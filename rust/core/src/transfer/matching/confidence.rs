@@ -85,12 +85,13 @@ pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, T
     };
     let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
     let around = VertexTriangles::new(target.triangles, target.positions.len());
+    let sides: Vec<Option<Vec3>> = target.triangles.par_iter().with_min_len(1024).map(|t| side(&target, t)).collect();
     let finish = |i: usize, found: &[Priced]| {
         let mut choice = choose(source, found, closest[i].distance, size);
-        let sides: Vec<Vec3> = around.around(i).iter().filter_map(|&t| side(&target, t)).collect();
         let agreement = |(point, share): &(SurfacePoint, f64)| {
-            let directions = std::iter::once(&target.normals[i]).chain(&sides);
-            let cosines = directions.filter_map(|&normal| self::cosine(source, point, normal));
+            let there = blend(source, point);
+            let sides = around.around(i).iter().filter_map(|&t| sides[t as usize]);
+            let cosines = std::iter::once(target.normals[i]).chain(sides).filter_map(|normal| between(there, normal));
             share * cosines.map(f64::abs).reduce(f64::max).unwrap_or(1.0)
         };
         choice.cosine = choice.points.iter().map(agreement).sum();
@@ -111,10 +112,18 @@ fn cost(distance: f64, cosine: Option<f64>, size: f64) -> f64 {
 
 /// Cosine between a vertex's normal and the source's normal at `point`, None where either has no length.
 fn cosine(source: &Source, point: &SurfacePoint, normal: Vec3) -> Option<f64> {
+    between(blend(source, point), normal)
+}
+
+/// The source's normal at `point`, of any length.
+fn blend(source: &Source, point: &SurfacePoint) -> DVec3 {
     let corners = source.triangles()[point.triangle as usize];
-    let blend: DVec3 = std::iter::zip(corners, point.barycentric)
-        .map(|(i, share)| source.normals()[i as usize].as_dvec3() * share)
-        .sum();
+    let normals = corners.map(|i| source.normals()[i as usize].as_dvec3());
+    std::iter::zip(normals, point.barycentric).map(|(normal, share)| normal * share).sum()
+}
+
+/// Cosine between two directions, None where either has no length.
+fn between(blend: DVec3, normal: Vec3) -> Option<f64> {
     let normal = normal.as_dvec3();
     let lengths = blend.length() * normal.length();
     (lengths > 0.0).then(|| (blend.dot(normal) / lengths).clamp(-1.0, 1.0))
@@ -127,13 +136,16 @@ fn may_move(cost: f64, distance: f64, size: f64) -> bool {
 }
 
 /// Unit normal of a triangle of the target, unless it has none.
-fn side(target: &TargetSurface<'_>, t: u32) -> Option<Vec3> {
-    let [a, b, c] = target.triangles[t as usize].map(|i| Vec3::from(target.positions[i as usize]).as_dvec3());
+fn side(target: &TargetSurface<'_>, triangle: &[u32; 3]) -> Option<Vec3> {
+    let [a, b, c] = triangle.map(|i| Vec3::from(target.positions[i as usize]).as_dvec3());
     (b - a).cross(c - a).try_normalize().map(DVec3::as_vec3)
 }
 
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
 fn choose(source: &Source, found: &[Priced], distance: f64, size: f64) -> Choice {
+    if let [only] = found {
+        return Choice { points: vec![(only.point, 1.0)], gap: only.point.distance, cosine: 1.0 };
+    }
     let near = (distance + EQUALLY_NEAR * size).powi(2);
     let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
     let least = |among: &dyn Fn(&Priced) -> bool| {
