@@ -2,9 +2,6 @@
 
 import os
 
-import pytest
-from conftest import OUT
-
 
 def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
@@ -45,12 +42,6 @@ def test_no_session_is_lost_and_none_is_left_behind(blender):
 
 def test_what_happens_around_sessions_harms_nothing(blender):
     assert len(blender.run("sideways", timeout=900, size=(700, 520))["passed"]) == 21
-
-
-@pytest.mark.parametrize("what", ["work", "session", "preview"])
-def test_blender_quits_in_order(blender, what):
-    assert blender.run("quitting", what, timeout=200, size=(700, 520))["quit"] == what
-    assert "skinwright" not in (OUT / blender.name / "quitting" / "log.txt").read_text().partition("Traceback")[2]
 
 
 def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):
