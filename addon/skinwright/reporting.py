@@ -35,6 +35,7 @@ class Report:
     """
 
     source: str
+    method: str
     garments: list[GarmentReport]
     warnings: list[str] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
@@ -43,9 +44,11 @@ class Report:
     def sentence(self) -> str:
         """The line the artist reads when it is done."""
         names = ", ".join(garment.target for garment in self.garments)
-        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices matched"]
-        counts.append(f"{self._sum('inpainted')} inpainted")
-        counts += self._distance()
+        done = ("matched closely", "smoothed") if self.method == "confidence" else ("matched", "inpainted")
+        counts = [f"{self._sum('matched')} of {self._sum('vertices')} vertices {done[0]}"]
+        counts.append(f"{self._sum('inpainted')} {done[1]}")
+        if self.method != "confidence":
+            counts += self._distance()
         if self._sum("untouched"):
             counts.append(f"{self._sum('untouched')} left as they were")
         loose = sum(len(garment.native["unmatched_islands"]) for garment in self.garments)

@@ -7,6 +7,10 @@ def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
 
 
+def test_every_panel_opens(blender):
+    assert blender.run("panels", size=(1000, 1300))["panels"] > 15
+
+
 def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
     seen = blender.run("match_mask", size=(1100, 800))
     assert seen["many"][0] > seen["few"][0]
@@ -34,6 +38,10 @@ def test_a_sculpt_becomes_weights_and_one_undo_step(blender):
 
 def test_no_session_is_lost_and_none_is_left_behind(blender):
     assert len(blender.run("sessions", timeout=900, size=(700, 520))["passed"]) == 13
+
+
+def test_what_happens_around_sessions_harms_nothing(blender):
+    assert len(blender.run("sideways", timeout=900, size=(700, 520))["passed"]) == 21
 
 
 def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):

@@ -311,3 +311,5 @@ def test_the_command_does_the_same(addon, legs, rig, tmp_path, capsys):
     assert f"{len(legs.data.vertices)} vertices have weights for 5 bones" in capsys.readouterr().out
     assert json.loads(report.read_text())["meshes"][0]["bones"] == 5
     assert addon.headless.command_line.main(["autoskin", "--target", "Nobody"]) == 1
+    assert addon.headless.command_line.main(["autoskin", "--target", "Legs", "--armature", "Legs"]) == 1
+    assert "Legs is no armature" in capsys.readouterr().err

@@ -137,6 +137,35 @@ class TestRigs:
         assert bpy.context.scene.frame_current == frame and [v.select for v in body.data.vertices] == selected
 
 
+class TestWhatIsLeftOut:
+    """A verdict about weights that something else overrules says so."""
+
+    @pytest.fixture
+    def trousers(self):
+        trousers = figure.trousers()
+        figure.paint(trousers, figure.weights_at(figure.rest(trousers)))
+        figure.bind(trousers, figure.rig())
+        return trousers
+
+    def test_nothing(self, check, trousers):
+        assert check(trousers).tested.endswith("deform bones alone, blended linearly")
+
+    def test_envelopes(self, check, trousers):
+        trousers.modifiers[0].use_bone_envelopes = True
+        assert check(trousers).tested.endswith("without bone envelopes")
+
+    def test_modifiers_that_overrule(self, check, trousers):
+        modifier = trousers.modifiers.new("Edit", "VERTEX_WEIGHT_EDIT")
+        modifier.vertex_group = "Leg.L"
+        trousers.modifiers.move(1, 0)
+        assert check(trousers).tested.endswith("without the modifier Edit, which overrules the weights")
+
+    def test_mirrored_halves(self, check, trousers):
+        trousers.modifiers.new("Mirror", "MIRROR")
+        trousers.modifiers.move(1, 0)
+        assert check(trousers).tested.endswith("without what the modifier Mirror adds")
+
+
 class TestOpen:
     """Vertices at one place at rest that a pose takes apart."""
 

@@ -160,6 +160,22 @@ def test_the_settings_last_used_are_the_panels(addon, scene):
     assert settings.max_influences == 1  # refused means unchanged
 
 
+def test_thresholds_alone_mean_the_method_that_has_them(addon, scene):
+    """Of scripts and files that were written when there was one method; whoever names a method gets that."""
+    settings, read = scene.skinwright.transfer, addon.transfer.from_json
+    settings.source = builders.body()
+    builders.select(builders.grid("Coat", 9, z=0.02))
+    bpy.ops.skinwright.transfer_weights(smoothing_iterations=1)
+    assert settings.method == "CONFIDENCE"
+    bpy.ops.skinwright.transfer_weights(max_normal_angle=0.5)
+    assert settings.method == "PAPER"
+    bpy.ops.skinwright.transfer_weights(max_normal_angle=0.5, method="CONFIDENCE")
+    assert settings.method == "CONFIDENCE"
+    assert read({}).method == "confidence"
+    assert read({"relative_max_distance": 0.1}).method == "paper"
+    assert read({"relative_max_distance": 0.1, "method": "confidence"}).method == "confidence"
+
+
 def test_saving_and_removing_a_preset(addon, scene):
     scene.skinwright.transfer.max_influences = 4
     bpy.ops.skinwright.transfer_preset_add(name="Mine")

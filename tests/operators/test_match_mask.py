@@ -56,6 +56,7 @@ def test_categories(session):
 
 
 def test_sliders_only_threshold(session):
+    bpy.context.scene.skinwright.transfer.method = "PAPER"
     assert counts(session) == [45, 36, 0, 0, 3]
     bpy.context.scene.skinwright.transfer.max_distance = 0.6
     assert counts(session) == [81, 0, 0, 0, 3]
@@ -71,6 +72,7 @@ def test_the_mask_decides(coat, session):
 
 def test_confidence_is_graded_and_coloured(coat, session):
     transfer = bpy.context.scene.skinwright.transfer
+    transfer.method = "PAPER"
     assert session.match(params()).confidence is None
     transfer.method = "CONFIDENCE"
     match = session.match(params())
@@ -232,7 +234,7 @@ class TestPainting:
 
     def test_finish_restores_group_and_overlay(self, coat, painting):
         painting.finish()
-        painting.close(bpy.context)
+        painting.close()
         assert coat.vertex_groups.active.name == "Old"
         assert bpy.context.scene.skinwright.overlay.kind == "NONE"
         assert coat.skinwright.mask_group == "Match Mask"

@@ -457,6 +457,32 @@ def test_linked_data_is_refused(sculpt, body, tmp_path):
         sculpt.SculptSession(wanted.objects[0])
 
 
+def test_an_overridden_mesh_is_refused(sculpt, body, tmp_path):
+    """Blender lets its weights be written, and the file forgets them."""
+    path = tmp_path / "library.blend"
+    bpy.data.libraries.write(str(path), {body}, fake_user=True)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = ["Body"]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    obj = wanted.objects[0].override_create(remap_local_usages=True)
+    with pytest.raises(ValueError, match="linked from"):
+        sculpt.SculptSession(obj)
+    obj.data.override_create(remap_local_usages=True)
+    assert obj.data.is_editable
+    with pytest.raises(ValueError, match="is a library override, of which files keep no weights"):
+        sculpt.SculptSession(obj)
+    obj.data.make_local()
+    assert sculpt.SculptSession(obj).target() == obj
+
+
+def test_groups_without_members_are_refused(sculpt, body):
+    """As remeshing leaves them."""
+    for group in body.vertex_groups:
+        group.remove(range(len(body.data.vertices)))
+    with pytest.raises(ValueError, match="No vertex of Body is in a group of a deform bone of Rig: bind it first"):
+        sculpt.SculptSession(body)
+
+
 def test_a_missing_object_is_named(sculpt, body):
     session = sculpt.SculptSession(body)
     bpy.data.objects.remove(body)

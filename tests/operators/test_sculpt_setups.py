@@ -295,3 +295,10 @@ def posed_all(obj):
     bpy.context.view_layer.update()
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     return np.array([vertex.co for vertex in evaluated.vertices])
+
+
+def test_a_mesh_that_is_deformed_twice_is_refused(sculpt, addon, body, rig):
+    """A modifier moves it, and the parent moves it again."""
+    body.parent, body.parent_type = rig, "ARMATURE"
+    with pytest.raises(addon.scene.error.SceneError, match="is deformed by .* too, as its child"):
+        sculpt.SculptSession(body)

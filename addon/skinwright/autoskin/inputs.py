@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, mesh, mirror, rest_bones, sculpting, shapes, sides, symmetry, vertex_groups
+from ..scene import armature, editable, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import completion, merging
@@ -54,12 +54,14 @@ def read(objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, para
 
 
 def _rig_of(obj: bpy.types.Object, rig: bpy.types.Object | None) -> bpy.types.Object:
-    sculpting.check_editable(obj)
+    editable.check(obj)
     rig = rig or armature.find(obj)
     if rig is None:
         raise SceneError(
             f"{obj.name} has no armature to take bones from: select one too, or give it an Armature modifier"
         )
+    if rig.type != "ARMATURE":
+        raise SceneError(f"{rig.name} is no armature: name the armature whose bones the weights follow")
     if not armature.deform_bones(rig):
         raise SceneError(f"{rig.name} has no bone that deforms {obj.name}: turn Deform on for some")
     mesh.check_world(obj, rig)

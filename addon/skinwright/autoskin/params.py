@@ -13,7 +13,7 @@ METHODS: Choices = {
 }
 Geometry = Literal["AS_SHOWN", "REST"]
 GEOMETRIES: Choices = {
-    "AS_SHOWN": ("As Shown, in Rest Pose", "The shape with shape keys and modifiers, but not as it is posed"),
+    "AS_SHOWN": ("As Shown, at Rest", "The shape with shape keys and modifiers, but not as it is posed"),
     "REST": ("Rest", "The shape without modifiers, shape keys or pose"),
 }
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import csr, jobs, native
 from ..jobs import Jobs
-from ..scene import armature, mesh, places, poses, shapes, skeleton, vertex_groups
+from ..scene import armature, followers, mesh, mirror, places, poses, shapes, skeleton, vertex_groups
 from ..scene.error import SceneError
 from . import body_plan
 from .params import CheckParams
@@ -135,9 +135,13 @@ def _left_out(target: bpy.types.Object, rigs: list[bpy.types.Object], used: list
     """What the target's own deformation does beyond linear blending, in words."""
     bendy = any(rig.data.bones[n].bbone_segments > 1 for rig in rigs for n in used if n in rig.data.bones)
     models = [model for model in armature.modifiers(target) if model.show_viewport]
+    overruling = followers.overruling(target, set(used))
     words = [
         *(["bendy bones as straight ones"] if bendy else []),
         *(["without Preserve Volume"] if any(model.use_deform_preserve_volume for model in models) else []),
+        *(["without bone envelopes"] if armature.envelopes(target) else []),
+        *(f"without the modifier {modifier.name}, which overrules the weights" for modifier in overruling),
+        *(f"without what the modifier {modifier.name} adds" for modifier in mirror.before_the_pose(target)),
     ]
     return "".join(f", {word}" for word in words)
 

@@ -11,7 +11,7 @@ from .. import csr, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..reporting import DesparsifyReport
-from ..scene import armature, mesh, object_state, sculpting, vertex_groups
+from ..scene import armature, editable, mesh, object_state, vertex_groups
 from ..scene.error import SceneError
 from .params import DesparsifyParams
 
@@ -82,7 +82,7 @@ def nearest_bones(
 
 
 def _check(obj: bpy.types.Object) -> bpy.types.Object:
-    sculpting.check_editable(obj)
+    editable.check(obj)
     rig = armature.find(obj)
     if rig is None:
         raise SceneError(f"{obj.name} has no armature to take bones from: give it an Armature modifier")

@@ -68,6 +68,9 @@ def steps(
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
+    for obj in targets:
+        if params.bind and not obj.is_editable:
+            raise SceneError(f"{obj.name} is linked from another file: make it local, or turn Bind off")
     shapes = [mesh.read(obj) for obj in targets]
     for obj, shape in zip(targets, shapes, strict=True):
         if not len(shape.triangles):

@@ -37,6 +37,7 @@ class MaskPainting:
         mask.check(target)
         self.before = weight_state.capture(target)
         self.mask_group, self.overlay = target.skinwright.mask_group, settings.overlay.kind
+        self.scene = context.scene.name
         self.session = MatchSession(settings.transfer.source, target, params)
         self.source = settings.transfer.source.name if params.add_armature else ""
         self.problem = ""
@@ -148,7 +149,9 @@ class MaskPainting:
             if name in target.modifiers:
                 target.modifiers.remove(target.modifiers[name])
 
-    def close(self, context: bpy.types.Context) -> None:
+    def close(self) -> None:
         """The overlay becomes what it was."""
         self._stop()
-        context.scene.skinwright.overlay.kind = self.overlay
+        scene = bpy.data.scenes.get(self.scene)
+        if scene:
+            scene.skinwright.overlay.kind = self.overlay

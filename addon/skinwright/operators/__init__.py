@@ -16,10 +16,11 @@ from . import (
     stored_weights,
     transfer_weights,
 )
-from .modal import keep_alive, timers, undo
+from .modal import keep_alive, long_work, timers, undo
 
 MODULES = (
     timers,
+    long_work,
     keep_alive,
     undo,
     transfer_weights,

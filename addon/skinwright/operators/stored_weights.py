@@ -9,7 +9,7 @@ from bpy.types import Context, Event, Object, Operator
 
 from .. import files, preferences
 from ..registration import registration
-from ..scene import blend_file, mesh
+from ..scene import blend_file, editable, mesh
 from ..stored import comparing, exchange, keeping, restoring
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
 
@@ -86,6 +86,8 @@ class SKINWRIGHT_OT_store_weights(_OnMeshes):
 
     def on_meshes(self, context: Context, objects: list[Object]) -> set[str]:
         """One state per mesh."""
+        for obj in objects:
+            editable.check(obj)
         for obj in objects:
             keeping.keep(obj, self.state_name or "Weights")
             self.report({"INFO"}, f"{obj.name}: weights stored; all states take {keeping.size(obj) / 1024:,.0f} KiB")

@@ -9,6 +9,7 @@ from ..reporting import Report
 from ..settings import TransferSettings
 from ..settings.properties import last_used
 from ..transfer import TransferParams, steps
+from ..transfer.params import means_thresholds
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
 from .comparison import compared
 from .modal.long_work import LongWork
@@ -87,6 +88,8 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
         return compared(transfer, source, chosen, params.max_influences) if self.compare else transfer
 
     def _inputs(self, context: Context) -> tuple[Context, Object, list[Object], TransferParams]:
+        if means_thresholds(filter(self.properties.is_property_set, TransferSettings.__annotations__)):
+            self.method = "PAPER"  # as a script means that was written for it
         params = self.to_params(preferences.threads(context))
         return context, context.scene.skinwright.transfer.source, targets(context), params
 

@@ -57,24 +57,29 @@ def stop() -> None:
 
 
 def update() -> bool:
-    """Refine the present pose if it is another one; whether anything was done. Ends if an object is gone."""
+    """Refine the present pose if it is another one; whether anything was done.
+
+    Raises SceneError if an object is gone, has another name or other vertices.
+    """
     live = current
     if live is None:
         return False
     obj, rig = bpy.data.objects.get(live.body.name), bpy.data.objects.get(live.body.rig)
     if obj is None or rig is None or len(obj.data.vertices) != len(live.body.positions):
-        stop()
-        return False
+        raise SceneError(_lost(live))
     pose = characters.pose(obj, live.body)
     if live.pose is not None and np.array_equal(pose, live.pose):
         return False
     live.pose = pose
     refined = live.refiner.solve(pose, quality="live")
     if not preview_object.place(obj.name, refined):
-        stop()
-        return False
+        raise SceneError(_lost(live))
     _move_garments(live, pose, refined)
     return True
+
+
+def _lost(live: Live) -> str:
+    return f"{live.body.name}, its armature or its stand-in is gone, has another name or other vertices: start it again"
 
 
 def _move_garments(live: Live, pose: NDArray[np.float64], refined: NDArray[np.float32]) -> None:
@@ -87,15 +92,14 @@ def _move_garments(live: Live, pose: NDArray[np.float64], refined: NDArray[np.fl
 
 
 def restart() -> None:
-    """Show again what undo or saving took away."""
+    """Show again what undo or saving took away. Raises SceneError as `update` does."""
     if current is None:
         return
     current.pose = None
     for name in (current.body.name, *(follower.character.name for follower in current.garments)):
         obj = bpy.data.objects.get(name)
         if obj is None:
-            stop()
-            return
+            raise SceneError(_lost(current))
         if preview_object.of(name) is None:
             preview_object.show(obj)
     update()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, landmarks, mesh, rest_bones, sculpting, vertex_groups
+from ..scene import armature, editable, landmarks, mesh, rest_bones, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from . import bone_map
@@ -59,7 +59,7 @@ def read_pair(
             "one armature"
         )
     for obj in targets:
-        sculpting.check_editable(obj)
+        editable.check(obj)
     rows = _rows(giver)
     matches = match_bones(giver.bones, taker.bones, params)
     if not any(entry.source for entry in matches):

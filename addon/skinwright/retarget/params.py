@@ -77,7 +77,7 @@ class RetargetParams(Params):
     max_influences: int = max_influences(native=True)
     show_correspondence: bool = setting(
         False,
-        "Show Correspondence",
+        "Correspondence",
         "Store the place that each vertex was matched to as the color attribute Correspondence on both characters",
     )
     threads: int = threads()

@@ -79,6 +79,19 @@ def moving(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     return [rig for rig in dict.fromkeys(found) if rig.type == "ARMATURE"]
 
 
+def envelopes(obj: bpy.types.Object) -> str:
+    """What, beside weights, lets bones deform `obj` where they are near: a phrase, or nothing."""
+    for modifier in modifiers(obj):
+        if modifier.show_viewport and not modifier.use_vertex_groups:
+            return f"is bound by bone envelopes and not by groups in the modifier {modifier.name}"
+        if modifier.show_viewport and modifier.use_bone_envelopes:
+            return f"is bound by bone envelopes too in the modifier {modifier.name}"
+    groups = {group.name for group in obj.vertex_groups}
+    bones = (bone for rig in rigs(obj) for bone in rig.data.bones if bone.use_deform and bone.name in groups)
+    multiplied = [bone.name for bone in bones if bone.use_envelope_multiply]
+    return f"follows the bone {multiplied[0]}, whose Envelope Multiply is on" if multiplied else ""
+
+
 def constraint_targets(constraint: bpy.types.Constraint) -> list[bpy.types.Object]:
     """The objects a constraint that is on follows."""
     if constraint.mute or constraint.influence == 0:
@@ -108,6 +121,18 @@ def is_posed(armature: bpy.types.Object) -> bool:
     return bool(moved.max() > 1e-5 * size)
 
 
+def deforms_as_parent(obj: bpy.types.Object) -> bool:
+    """Whether the parent of `obj` deforms it without a modifier: an armature, a lattice or a curve."""
+    kinds = ("ARMATURE", "LATTICE", "CURVE")
+    return bool(obj.parent and obj.parent.type in kinds and obj.parent_type in ("ARMATURE", "LATTICE", "CURVE"))
+
+
+def follows_any(obj: bpy.types.Object, rigs: Sequence[bpy.types.Object]) -> bool:
+    """Whether an armature deforms `obj`, or one of `rigs` would if its modifier were not hidden."""
+    deforming = [m.object for m in modifiers(obj) if m.show_viewport or m.object in rigs]
+    return bool(deforming) or (obj.parent_type == "ARMATURE" and find(obj) == obj.parent)
+
+
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
     """Let the armatures that deform `source` deform `obj`: by modifiers of the same settings.
 
@@ -115,10 +140,10 @@ def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
     """
     place = _place_of_first(obj)
     models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
+    added = []
     for rig in [m.object for m in models] or [find(source)]:
-        _add_modifier(obj, rig, place)
+        added.append(_add_modifier(obj, rig, place))
         place += 1
-    added = [m for m in obj.modifiers if m.type == "ARMATURE"]
     for modifier, model in zip(added, models, strict=False):
         for name in BINDING:
             setattr(modifier, name, getattr(model, name))
@@ -139,10 +164,12 @@ def _place_of_first(obj: bpy.types.Object) -> int:
     return mirrors[-1] + 1 if mirrors else 0
 
 
-def _add_modifier(obj: bpy.types.Object, rig: bpy.types.Object, place: int) -> None:
-    modifier = obj.modifiers.new(rig.name, "ARMATURE")
-    modifier.object = rig
+def _add_modifier(obj: bpy.types.Object, rig: bpy.types.Object, place: int) -> bpy.types.ArmatureModifier:
+    name = obj.modifiers.new(rig.name, "ARMATURE").name
     obj.modifiers.move(len(obj.modifiers) - 1, place)
+    modifier = obj.modifiers[name]  # moving exchanges what the modifiers point to
+    modifier.object = rig
+    return modifier
 
 
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ def check(obj: bpy.types.Object, make_single_user: bool) -> None:
     if any(m.type == "MIRROR" and m.show_viewport for m in obj.modifiers):
         raise SceneError(
             f"{obj.name} has a Mirror modifier and was fitted on a posed body, which is not symmetric: "
-            "apply the modifier, or set Geometry to As Shown, in Rest Pose"
+            "apply the modifier, or set Geometry to As Shown, at Rest"
         )
     others = mesh.other_users(obj)
     if others and not make_single_user:

@@ -7,14 +7,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from . import editable
 from . import mesh as scene_mesh
 from .error import SceneError
 
 
 def check(obj: bpy.types.Object) -> None:
     """Raise SceneError where keys cannot be added."""
-    if obj.library or obj.data.library:
-        raise SceneError(f"{obj.name} is linked from another file: make it local before keys are added")
+    editable.check(obj)
     if obj.mode != "OBJECT":
         raise SceneError(f"{obj.name} is in {obj.mode.title()} mode: go to Object or Pose mode first")
     shared = scene_mesh.other_users(obj)

@@ -5,12 +5,16 @@ from dataclasses import dataclass
 from functools import partial
 
 import bpy
+import numpy as np
 from mathutils import Matrix
 
-from . import armature, modifiers
+from .. import csr
+from . import armature, carried, modifier_inputs, modifiers, shapes, vertex_groups
 
 # Modifiers that take the shape of other objects; all others look at their places at most.
 _FOLLOWS_A_SHAPE = {"BOOLEAN", "CURVE", "LATTICE", "MESH_DEFORM", "NODES", "SHRINKWRAP", "SURFACE_DEFORM"}
+# Nodes store weights as they are.
+_SAME_WEIGHT = 1e-4
 
 
 @dataclass(frozen=True)
@@ -30,30 +34,26 @@ def others(
     """
     return [
         *_parents(obj, sources, world),
-        *_constraints(obj, world),
-        *_drivers(obj, world),
+        *_constraints(obj, sources, world),
+        *_drivers(obj, sources, world),
         *_armatures(obj, sources),
         *_switched_off(obj, sources),
         *_surfaces(obj, sources),
-        *_overruling(obj, set(groups)),
+        *_overruled(obj, set(groups)),
     ]
 
 
 def _parents(obj: bpy.types.Object, sources: list[bpy.types.Object], world: Matrix) -> list[Follower]:
-    parent = obj.parent
-    if parent is None:
-        return []
-    if obj.parent_type == "BONE" and parent.type == "ARMATURE":
-        phrase = f"is parented to the bone {obj.parent_bone} of {parent.name}"
-        return [Follower(phrase, partial(_let_go, obj, parent, world))]
-    if obj.parent_type in ("VERTEX", "VERTEX_3") and parent in sources:
-        return [Follower(f"is parented to vertices of {parent.name}", partial(_let_go, obj, parent.parent, world))]
-    carried = parent
-    while carried.parent and carried.parent_type != "BONE":
-        carried = carried.parent
-    if carried.parent and carried.parent_type == "BONE":
-        phrase = f"hangs on {carried.name}, which is parented to the bone {carried.parent_bone}"
-        return [Follower(phrase, partial(_let_go, obj, carried.parent, world))]
+    phrase = carried.by_parent(obj, sources)
+    if phrase:
+        carrier = obj.parent if obj.parent_type == "BONE" else obj.parent.parent
+        return [Follower(phrase, partial(_let_go, obj, carrier, world))]
+    phrase = carried.by_ancestors(obj, sources)
+    if phrase:
+        return [Follower(phrase, partial(_let_go, obj, next(iter(armature.rigs(sources[0])), None), world))]
+    if armature.deforms_as_parent(obj) and obj.parent.type != "ARMATURE" and carried.is_deformed(obj.parent, sources):
+        phrase = f"is deformed as a child of {obj.parent.name}, which follows the pose too"
+        return [Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT"))]
     return []
 
 
@@ -64,46 +64,14 @@ def _let_go(obj: bpy.types.Object, parent: bpy.types.Object | None, world: Matri
     obj.matrix_world = world
 
 
-def _constraints(obj: bpy.types.Object, world: Matrix) -> list[Follower]:
-    found = []
-    for constraint in obj.constraints:
-        targets = armature.constraint_targets(constraint)
-        followed = [target for target in targets if _is_moved(target) or _is_bone(target, constraint)]
-        if followed:
-            phrase = f"has the constraint {constraint.name}, which follows {followed[0].name}"
-            found.append(Follower(phrase, partial(_mute, obj, constraint, world)))
-    return found
+def _constraints(obj: bpy.types.Object, sources: list[bpy.types.Object], world: Matrix) -> list[Follower]:
+    found = carried.by_constraints(obj, sources)
+    return [Follower(phrase, partial(_mute, obj, constraint, world)) for phrase, constraint in found]
 
 
-def _drivers(obj: bpy.types.Object, world: Matrix) -> list[Follower]:
+def _drivers(obj: bpy.types.Object, sources: list[bpy.types.Object], world: Matrix) -> list[Follower]:
     """Drivers of the object's place by what a pose moves."""
-    found = []
-    for curve in obj.animation_data.drivers if obj.animation_data else ():
-        if curve.mute or not curve.data_path.removeprefix("delta_").startswith(("location", "rotation", "scale")):
-            continue
-        targets = [target for variable in curve.driver.variables for target in variable.targets]
-        bones = [t.id for t in targets if isinstance(t.id, bpy.types.Object) and (t.bone_target or _is_moved(t.id))]
-        bones += [t.id for t in targets if isinstance(t.id, bpy.types.Object) and "pose.bones" in t.data_path]
-        if bones:
-            phrase = f"has a driver on {curve.data_path}, which follows {bones[0].name}"
-            found.append(Follower(phrase, partial(_mute, obj, curve, world)))
-    return found
-
-
-def _is_bone(target: bpy.types.Object, constraint: bpy.types.Constraint) -> bool:
-    """Whether the constraint follows a bone of the armature `target`."""
-    return target.type == "ARMATURE" and (constraint.type == "ARMATURE" or bool(getattr(constraint, "subtarget", "")))
-
-
-def _is_moved(target: bpy.types.Object) -> bool:
-    """Whether a pose moves the object as a whole: it hangs on a bone, by parents or constraints."""
-    ancestor: bpy.types.Object | None = target
-    while ancestor:
-        bones = (_is_bone(other, c) for c in ancestor.constraints for other in armature.constraint_targets(c))
-        if (ancestor.parent and ancestor.parent_type == "BONE") or any(bones):
-            return True
-        ancestor = ancestor.parent
-    return False
+    return [Follower(phrase, partial(_mute, obj, curve, world)) for phrase, curve in carried.by_drivers(obj, sources)]
 
 
 def _mute(obj: bpy.types.Object, follows: bpy.types.Constraint | bpy.types.FCurve, world: Matrix) -> None:
@@ -116,10 +84,11 @@ def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[F
     models = [model for model in armature.modifiers(sources[0]) if model.show_viewport]
     found: list[tuple[tuple, tuple[str, bpy.types.ArmatureModifier]]] = []
     seen = [(model.object, _binding(model)) for model in models]
+    rigs = armature.rigs(sources[0])
     for modifier in armature.modifiers(obj):
-        if not modifier.show_viewport:
-            continue
-        phrase = _binding_phrase(modifier, models, armature.rigs(sources[0]))
+        if not modifier.show_viewport and (modifier.object in rigs or not modifier.show_render):
+            continue  # told by _switched_off, or it does nothing
+        phrase = _binding_phrase(modifier, models, rigs)
         bound = (modifier.object, _binding(modifier))
         if not phrase and bound not in seen and bound in [b for b, _ in found]:
             phrase = f"is deformed by {modifier.object.name} twice, the second time by the modifier {modifier.name}"
@@ -127,6 +96,10 @@ def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[F
             seen.remove(bound)
         found.append((bound, (phrase, modifier)))
     listed = [Follower(phrase, partial(obj.modifiers.remove, m)) for _, (phrase, m) in found if phrase]
+    parent = obj.parent if armature.deforms_as_parent(obj) else None
+    if rigs and parent and parent.type == "ARMATURE" and parent not in rigs:
+        phrase = f"is deformed as a child of {parent.name} and not by {rigs[0].name}"
+        listed.append(Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT")))
     by_modifier = [rig for (rig, _), (phrase, _) in found if not phrase]
     if obj.parent_type == "ARMATURE" and obj.parent in by_modifier and sources[0].parent_type != "ARMATURE":
         phrase = f"is deformed by {obj.parent.name} twice, by a modifier and as its child"
@@ -184,54 +157,53 @@ def _is_plain(modifier: bpy.types.ArmatureModifier) -> bool:
 def _surfaces(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
     """Modifiers that carry the mesh along with what a pose moves: the source's surface, bones, what hangs on them."""
     found = []
-    for modifier in modifiers.shown(obj):
-        followed = [other for other in _looked_at(modifier) if _moves(other, modifier, sources)]
+    for modifier in modifiers.used(obj):
+        followed = [other for other in modifier_inputs.objects(modifier) if _moves(other, modifier, sources)]
         if followed and modifier.type != "ARMATURE" and modifiers.moves(modifier):
             phrase = f"has the modifier {modifier.name}, which follows {followed[0].name} too"
             found.append(Follower(phrase, partial(_hide, modifier)))
     return found
 
 
-def _looked_at(modifier: bpy.types.Modifier) -> list[bpy.types.Object]:
-    """The objects that a modifier's settings, inputs and nodes name."""
-    pointers = [p for p in modifier.bl_rna.properties if p.type == "POINTER" and p.fixed_type.identifier == "Object"]
-    found = [getattr(modifier, pointer.identifier) for pointer in pointers]
-    if modifier.type == "NODES" and modifier.node_group:
-        sockets = [socket for node in modifier.node_group.nodes for socket in node.inputs if socket.type == "OBJECT"]
-        found += [*_node_inputs(modifier), *(socket.default_value for socket in sockets)]
-    return [other for other in dict.fromkeys(found) if other]
-
-
-def _node_inputs(modifier: bpy.types.NodesModifier) -> list[bpy.types.Object | None]:
-    """The objects given to a node tree. Blender 5.2 keeps inputs as properties, those before as ID properties."""
-    sockets = [item for item in modifier.node_group.interface.items_tree if item.item_type == "SOCKET"]
-    names = [s.identifier for s in sockets if s.in_out == "INPUT" and s.socket_type == "NodeSocketObject"]
-    if hasattr(modifier, "properties"):
-        inputs = [getattr(modifier.properties.inputs, name, None) for name in names]
-        return [getattr(given, "value", None) for given in inputs]
-    return [modifier.get(name) for name in names]
-
-
 def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: list[bpy.types.Object]) -> bool:
     """Whether a pose changes what the modifier sees of the object."""
     if other.type == "ARMATURE":
-        return modifier.type == "HOOK"
-    if _is_moved(other):
+        return modifier_inputs.names_a_bone(modifier)
+    if carried.is_carried(other, sources):
         return True
-    hooked = any(m.type == "HOOK" and m.object and m.object.type == "ARMATURE" for m in other.modifiers)
-    return modifier.type in _FOLLOWS_A_SHAPE and (other in sources or bool(armature.rigs(other)) or hooked)
+    return modifier.type in _FOLLOWS_A_SHAPE and carried.is_deformed(other, sources)
 
 
-def _overruling(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
+def _overruled(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:
+    return [
+        Follower(f"has the modifier {m.name}, which overrules the weights written", partial(_hide, m))
+        for m in overruling(obj, groups)
+    ]
+
+
+def overruling(obj: bpy.types.Object, groups: set[str]) -> list[bpy.types.Modifier]:
     """Modifiers that change the groups before the armature reads them."""
     found = []
-    for modifier in modifiers.shown(obj):
+    for modifier in modifiers.used(obj):
         if modifier.type == "ARMATURE":
             break
-        if modifiers.transfers_weights(modifier) or modifiers.written_group(modifier) in groups:
-            phrase = f"has the modifier {modifier.name}, which overrules the weights written"
-            found.append(Follower(phrase, partial(_hide, modifier)))
+        by_settings = modifiers.transfers_weights(modifier) or modifiers.written_group(modifier) in groups
+        if by_settings or _rewrites(obj, modifier, groups):
+            found.append(modifier)
     return found
+
+
+def _rewrites(obj: bpy.types.Object, modifier: bpy.types.Modifier, groups: set[str]) -> bool:
+    """Whether nodes change the weights in these groups, which only their result tells, or lose them."""
+    if modifier.type != "NODES" or not modifier.show_viewport:
+        return False
+    names = sorted(groups)
+    before, after = vertex_groups.read(obj, names), shapes.weights_after(obj, modifier, names)
+    if len(before.indptr) != len(after.indptr):
+        return bool((before.values > 0).any()) and not (after.values > 0).any()
+    before, after = (csr.keep_entries(rows, rows.values > 0) for rows in (before, after))
+    same = np.array_equal(before.indptr, after.indptr) and np.array_equal(before.bones, after.bones)
+    return not same or bool(np.abs(before.values - after.values).max(initial=0) > _SAME_WEIGHT)
 
 
 def _hide(modifier: bpy.types.Modifier) -> None:

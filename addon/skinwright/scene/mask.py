@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from . import symmetry, vertex_groups
+from . import editable, symmetry, vertex_groups
 from .error import SceneError
 
 INPAINT, AUTOMATIC, FORCE_MATCH = 0, 1, 2
@@ -48,6 +48,7 @@ def read(
 
 def check(obj: bpy.types.Object) -> None:
     """Raise SceneError for a mask that cannot be edited here."""
+    editable.check(obj)
     settings = obj.skinwright
     if settings.mask_group and settings.mask_reading != Reading.STEER.value:
         raise SceneError(f"The mask of {obj.name} is read as another tool's: set Reading to Steer to edit it here")

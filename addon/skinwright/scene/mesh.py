@@ -117,6 +117,13 @@ def edges(obj: bpy.types.Object) -> NDArray[np.int32]:
     return vertices.reshape(-1, 2)
 
 
+def border(obj: bpy.types.Object) -> NDArray[np.int32]:
+    """(E, 2) the edges of exactly one face."""
+    used = np.empty(len(obj.data.loops), np.int32)
+    obj.data.loops.foreach_get("edge_index", used)
+    return edges(obj)[np.bincount(used, minlength=len(obj.data.edges)) == 1]
+
+
 def select(obj: bpy.types.Object, chosen: NDArray[np.bool_]) -> None:
     """Select these vertices (V,) and what lies wholly between them; not in Edit mode."""
     mesh = obj.data

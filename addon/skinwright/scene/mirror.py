@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from . import modifiers, sides
+from . import armature, modifiers, sides
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,23 @@ class Reflection:
 
 
 def before_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
-    """The Mirror modifiers that are on and come before the armature, whose halves the weights are to move."""
+    """The Mirror modifiers before the armature, on in the viewport or in renders: weights are to move their halves."""
+    posed = _of_the_pose(obj)
+    return [m for m in modifiers.used(obj) if m.type == "MIRROR" and m not in posed]
+
+
+def after_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
+    """The Mirror modifiers that come after an armature, in the viewport or in renders: they mirror its pose."""
+    return [m for m in _of_the_pose(obj) if m.show_viewport or m.show_render]
+
+
+def _of_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
+    """Those after the first armature. One that deforms as a parent comes before all modifiers."""
+    is_posed = armature.deforms_as_parent(obj) and obj.parent.type == "ARMATURE"
     found = []
-    for modifier in modifiers.shown(obj):
-        if modifier.type == "ARMATURE":
-            break
-        if modifier.type == "MIRROR":
+    for modifier in obj.modifiers:
+        is_posed = is_posed or (modifier.type == "ARMATURE" and bool(modifier.object) and modifier.show_viewport)
+        if is_posed and modifier.type == "MIRROR":
             found.append(modifier)
     return found
 
@@ -71,11 +82,11 @@ def _cuts_off(
     return bool(side.min(initial=0) < -(modifier.bisect_threshold + merged / scale + 1e-6))
 
 
-def is_right(reflection: Reflection, armature: bpy.types.Object | None, opposite: dict[str, str]) -> bool:
+def is_right(reflection: Reflection, rig: bpy.types.Object | None, opposite: dict[str, str]) -> bool:
     """Whether the copy's groups are those of the side it lies on; `opposite` has the other side's bone of each."""
     if reflection.flips and sides.unflippable(opposite):
         return False
-    exchanged = sides.exchanged(armature, opposite, reflection.world)
+    exchanged = sides.exchanged(rig, opposite, reflection.world)
     if exchanged is None:  # then only names can tell
         return reflection.flips or all(name == other for name, other in opposite.items())
     return exchanged == reflection.flips

@@ -64,6 +64,16 @@ def shown(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [modifier for modifier in obj.modifiers if modifier.show_viewport]
 
 
+def used(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers that are on in the viewport or in renders, first to last."""
+    return [modifier for modifier in obj.modifiers if modifier.show_viewport or modifier.show_render]
+
+
+def welded(obj: bpy.types.Object) -> float:
+    """Up to which distance Weld modifiers make one vertex of several, in the mesh's own units."""
+    return max((m.merge_threshold for m in used(obj) if m.type == "WELD" and m.mode == "ALL"), default=0.0)
+
+
 def keeps_vertices(modifier: bpy.types.Modifier) -> bool:
     """Whether each vertex is still the vertex of this index afterwards."""
     return modifier.type in KEEPS_VERTICES

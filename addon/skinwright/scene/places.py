@@ -1,6 +1,7 @@
-"""Points that lie at one place. Numpy only."""
+"""Points that lie at one place, or near one another."""
 
 import numpy as np
+from mathutils.kdtree import KDTree
 from numpy.typing import NDArray
 
 _PRIMES = np.array([73856093, 19349663, 83492791], np.int64)
@@ -29,6 +30,21 @@ def numbers(positions: NDArray[np.float32]) -> NDArray[np.int64]:
     return np.unique(keys, return_inverse=True)[1].reshape(-1)
 
 
+def connected(place: NDArray[np.int64], triangles: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """(V,) the same number for vertices that triangles (T, 3) connect; `place` (V,) is equal for those at one place."""
+    corners = place[triangles.astype(np.int64)]
+    label = np.arange(int(place.max(initial=-1)) + 1, dtype=np.int64)
+    while corners.size:
+        lowest = label[corners].min(axis=1)
+        before = label.copy()
+        for corner in corners.T:
+            np.minimum.at(label, corner, lowest)
+        label = label[label]
+        if np.array_equal(label, before):
+            break
+    return label[place]
+
+
 def first_at_each(positions: NDArray[np.float32], tolerance: float) -> NDArray[np.int64]:
     """(V,) for each point one of those at its place, the same for all of them."""
     near = coincident(positions, positions, tolerance)
@@ -38,3 +54,18 @@ def first_at_each(positions: NDArray[np.float32], tolerance: float) -> NDArray[n
 
 def _keys(points: NDArray[np.float32], cell: float, shift: float | NDArray[np.float64]) -> NDArray[np.int64]:
     return (np.floor((points.astype(np.float64) + shift) / cell).astype(np.int64) * _PRIMES).sum(axis=1, dtype=np.int64)
+
+
+def nearest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(n,) how far each query (n, 3) is from the closest of the points (m, 3)."""
+    return closest(points, queries)[1]
+
+
+def closest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(n,) the closest of the points (m, 3) to each query (n, 3), and how far it is."""
+    tree = KDTree(len(points))
+    for number, point in enumerate(points.tolist()):
+        tree.insert(point, number)
+    tree.balance()
+    found = [tree.find(query)[1:] for query in queries.tolist()]
+    return np.array([index for index, _ in found], np.int64), np.array([distance for _, distance in found], np.float64)

@@ -1,5 +1,7 @@
 """A stand-in for a mesh whose positions somebody else computes: a hidden copy that is never saved."""
 
+import json
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +11,10 @@ _HIDDEN = "skinwright_hidden_by_preview"
 
 
 def show(obj: bpy.types.Object) -> bpy.types.Object:
-    """Put a copy without armature and keys in the place of `obj`, which is hidden in this view layer."""
+    """Put a copy without armature and keys in the place of `obj`, which is hidden in every view layer that shows it.
+
+    Renders show the original alone: they are not made of what somebody else computes in the meantime.
+    """
     copy = obj.copy()
     copy.data = obj.data.copy()
     copy.name = f"{obj.name} (Refined)"
@@ -21,13 +26,44 @@ def show(obj: bpy.types.Object) -> bpy.types.Object:
     if copy.parent_type == "ARMATURE":
         copy.parent_type = "OBJECT"  # as an armature parent it would be deformed once more
     copy.animation_data_clear()
-    copy.hide_select = True
+    copy.hide_select = copy.hide_render = True
     copy[MARK] = obj.name
     for collection in obj.users_collection:
         collection.objects.link(copy)
-    obj[_HIDDEN] = True
-    obj.hide_set(True)
+    for view in _local_views(obj):
+        copy.local_view_set(view, True)
+    _hide(obj)
     return copy
+
+
+def _hide(obj: bpy.types.Object) -> None:
+    shown = [(scene, layer) for scene, layer in _layers(obj) if not obj.hide_get(view_layer=layer)]
+    obj[_HIDDEN] = json.dumps([(scene.name, layer.name) for scene, layer in shown])
+    for _, layer in shown:
+        obj.hide_set(True, view_layer=layer)
+
+
+def _show(obj: bpy.types.Object) -> None:
+    hidden = [tuple(names) for names in json.loads(obj[_HIDDEN])]
+    del obj[_HIDDEN]
+    for scene, layer in _layers(obj):
+        # A scene that has been renamed meanwhile shows the object rather than losing it.
+        if (scene.name, layer.name) in hidden or not {(s, v) for s, v in hidden if s in bpy.data.scenes}:
+            obj.hide_set(False, view_layer=layer)
+
+
+def _layers(obj: bpy.types.Object) -> list[tuple[bpy.types.Scene, bpy.types.ViewLayer]]:
+    """The view layers that have `obj`."""
+    every = [(scene, layer) for scene in bpy.data.scenes for layer in scene.view_layers]
+    return [(scene, layer) for scene, layer in every if obj.name in layer.objects]
+
+
+def _local_views(obj: bpy.types.Object) -> list[bpy.types.SpaceView3D]:
+    """The views that show only a choice of objects, `obj` among them; in Blender 4 its evaluated copy alone knows."""
+    known = (obj, obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    views = [area.spaces.active for area in areas if area.type == "VIEW_3D"]
+    return [view for view in views if view.local_view and any(one.local_view_get(view) for one in known)]
 
 
 def place(name: str, positions: NDArray[np.float32]) -> bool:
@@ -54,7 +90,5 @@ def clear() -> int:
         if data.users == 0:
             bpy.data.meshes.remove(data)
     for obj in [obj for obj in bpy.data.objects if _HIDDEN in obj]:
-        del obj[_HIDDEN]
-        if obj.name in bpy.context.view_layer.objects:
-            obj.hide_set(False)
+        _show(obj)
     return len(copies)

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import armature as scene_armature
-from . import mesh, vertex_groups
+from . import editable, mesh, vertex_groups
 from .error import SceneError
 
 # These leave every vertex where it is.
@@ -18,7 +18,7 @@ def check(obj: bpy.types.Object) -> bpy.types.Object:
     """The armature that deforms `obj`. Raises SceneError where weights would not do what the sculpt shows."""
     if obj.type != "MESH" or not obj.data.vertices:
         raise SceneError(f"{obj.name} is no mesh with vertices: make the skinned mesh the active object")
-    check_editable(obj)
+    editable.check(obj)
     _check_sculpt_mode(obj)
     rig = _armature(obj)
     mesh.check_world(obj, rig)
@@ -55,14 +55,6 @@ def _acting(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     return [modifier for modifier in scene_armature.modifiers(obj) if modifier.show_viewport]
 
 
-def check_editable(obj: bpy.types.Object) -> None:
-    """Raise SceneError for linked data: what is written there is lost on reload."""
-    for data in (obj, obj.data):
-        if not data.is_editable:
-            origin = data.library.filepath if data.library else "another file"
-            raise SceneError(f"{obj.name} is linked from {origin}: make it local or a library override with its mesh")
-
-
 def _check_sculpt_mode(obj: bpy.types.Object) -> None:
     if obj.mode == "EDIT":
         raise SceneError(f"{obj.name} is in Edit mode: leave it first")
@@ -85,6 +77,10 @@ def _armature(obj: bpy.types.Object) -> bpy.types.Object:
     if len(rigs) > 1:
         names = " and ".join(sorted(rig.name for rig in rigs))
         raise SceneError(f"{obj.name} is deformed by {names} at once: hide all Armature modifiers but those of one")
+    if acting and scene_armature.deforms_as_parent(obj):
+        raise SceneError(
+            f"{obj.name} is deformed by {obj.parent.name} too, as its child: set the parent's type to Object"
+        )
     rig = scene_armature.find(obj)
     if rig is None:
         raise SceneError(f"{obj.name} has no Armature modifier, so no weights to sculpt: give it one")

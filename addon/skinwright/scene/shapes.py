@@ -1,6 +1,6 @@
 """An object's shape in three ways: its mesh alone, as it is shown but in rest pose, or as it is shown now."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from . import armature, mesh, modifiers, poses, vertex_groups
+from . import armature, mesh, modifiers, places, poses, vertex_groups
 from .error import SceneError
 
 # REST is the mesh alone (with shape keys its Basis); AS_SHOWN adds shape keys in use and modifiers, but no pose;
@@ -42,7 +42,7 @@ def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Sh
     """Shape and weights in the groups `names`, of the vertices that all its modifiers leave; inside `looked_at`."""
     if look == "REST" or not _is_shaped(obj, look):
         return _plain(obj), vertex_groups.read(obj, names)
-    with _evaluable(obj) as shown:
+    with _evaluable(obj) as shown, _without(_reweighting_after_the_pose(shown)):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         evaluated = shown.evaluated_get(depsgraph)
         seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
@@ -52,6 +52,32 @@ def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Sh
         finally:
             evaluated.to_mesh_clear()
         return Shape(geometry, np.array(shown.matrix_world), []), rows
+
+
+def masked(obj: bpy.types.Object, look: Look) -> tuple[str, NDArray[np.float32]] | None:
+    """The object and Mask modifiers that hide a part of its surface, and the points (n, 3) there; inside `looked_at`.
+
+    Parts that hang on nothing visible, as helper geometry does, are not meant.
+    """
+    masks = [m for m in modifiers.shown(obj) if m.type == "MASK"]
+    if look == "REST" or not masks:
+        return None
+    left = read_source(obj, look, [])[0].geometry.positions
+    with _without(masks):
+        whole = read_source(obj, look, [])[0].geometry
+    same = places.numbers(np.concatenate([whole.positions, left]))
+    place, visible = same[: len(whole.positions)], same[len(whole.positions) :]
+    part = places.connected(place, whole.triangles)
+    gone = ~np.isin(place, visible)
+    cut = gone & np.isin(part, part[~gone])
+    names = " and ".join(m.name for m in masks)
+    return (f"the modifier {names} of {obj.name}", whole.positions[cut]) if cut.any() else None
+
+
+def _reweighting_after_the_pose(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The modifiers that change weights once the armature has used them."""
+    last = max((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE" and m.show_viewport), default=-1)
+    return [m for m in obj.modifiers[last + 1 :] if modifiers.changes_weights(m)] if last >= 0 else []
 
 
 def read_target(obj: bpy.types.Object, look: Look) -> Shape:
@@ -64,6 +90,19 @@ def read_target(obj: bpy.types.Object, look: Look) -> Shape:
         return Shape(geometry, np.array(shown.matrix_world), unseen)
 
 
+def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: list[str]) -> Rows:
+    """What this modifier alone leaves of the mesh's weights in the groups `names`."""
+    place = list(obj.modifiers).index(modifier)
+    with _evaluable(obj) as shown, _without(m for i, m in enumerate(shown.modifiers) if i != place):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        evaluated = shown.evaluated_get(depsgraph)
+        seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        try:
+            return vertex_groups.read_evaluated(evaluated, seen, names)
+        finally:
+            evaluated.to_mesh_clear()
+
+
 def _plain(obj: bpy.types.Object) -> Shape:
     return Shape(mesh.read(obj), np.array(obj.matrix_world), [])
 
@@ -72,6 +111,7 @@ def _is_shaped(obj: bpy.types.Object, look: Look) -> bool:
     """Whether anything but the mesh itself makes the shape."""
     shown = modifiers.shown(obj)
     shaping = any(modifiers.moves(m) or modifiers.changes_weights(m) for m in shown) or keys_in_use(obj)
+    shaping = shaping or (armature.deforms_as_parent(obj) and obj.parent.type != "ARMATURE")
     return shaping or (look == "CURRENT" and bool(armature.rigs(obj)))
 
 
@@ -106,13 +146,21 @@ def _kept_positions(obj: bpy.types.Object, look: Look) -> tuple[NDArray[np.float
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:
-    try:
-        for modifier in off:
-            modifier.show_viewport = False
+    with _without(off):
         evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
         return mesh.positions(evaluated.data)
+
+
+@contextmanager
+def _without(off: Iterable[bpy.types.Modifier]) -> Iterator[None]:
+    """Hide modifiers for the moment; those that are hidden already stay so."""
+    hidden = [modifier for modifier in off if modifier.show_viewport]
+    try:
+        for modifier in hidden:
+            modifier.show_viewport = False
+        yield
     finally:
-        for modifier in off:
+        for modifier in hidden:
             modifier.show_viewport = True
 
 

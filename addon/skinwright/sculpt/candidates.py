@@ -10,6 +10,7 @@ from .. import csr
 from ..csr import Rows
 from ..desparsify import DesparsifyParams, nearest_bones
 from ..scene import armature, vertex_groups
+from ..scene.error import SceneError
 from .params import SculptParams
 
 # Of the solver: skinwright_core::sculpt::MAX_MEMBERS.
@@ -33,17 +34,20 @@ def choose(obj: bpy.types.Object, rig: bpy.types.Object, options: SculptParams) 
     """Candidates among the deform bones that have members on this mesh.
 
     A bone that deforms nothing here is not offered: controls that were left to deform would win weights otherwise.
+    Raises SceneError where no bone has a member.
     """
     deforming = armature.deform_bones(rig)
     names = [bone.name for bone in rig.data.bones if bone.name in deforming and bone.name in obj.vertex_groups]
     before = vertex_groups.read(obj, names)
     present = np.isin(np.arange(len(names), dtype=np.int64), before.bones)
     names = [name for name, is_present in zip(names, present, strict=True) if is_present]
+    if not names:
+        raise SceneError(f"No vertex of {obj.name} is in a group of a deform bone of {rig.name}: bind it first")
     before = csr.take_columns(before, present)
     counts = np.diff(before.indptr).astype(np.int64)
     cut = counts > MOST_MEMBERS
     rows = _normalised_where(csr.keep_largest(before, np.full(len(counts), MOST_MEMBERS)), before, cut)
-    if options.candidates and names:
+    if options.candidates:
         params = DesparsifyParams(options.candidates, options.method, threads=options.threads)
         rows = _joined(rows, nearest_bones(obj, rig, names, rows, params), len(names))
     return Candidates(names, before, rows, cut)

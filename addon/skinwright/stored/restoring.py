@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
-from ..scene import mesh, object_state, sculpting, weight_state
+from ..scene import editable, mesh, object_state, weight_state
 from ..scene.weight_state import WeightState
 from ..transfer import scalar_fields
 from .record import Record
@@ -43,7 +43,7 @@ def restore(
     before_write: Callable[[Sequence[bpy.types.Object]], None] | None = None,
 ) -> Aligned:
     """Make a state the weights of an object. Raises SceneError and native.NativeError; then nothing has changed."""
-    sculpting.check_editable(obj)
+    editable.check(obj)
     aligned = align(obj, kept, threads)
     if before_write:
         before_write([obj])

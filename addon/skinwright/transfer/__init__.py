@@ -63,7 +63,7 @@ def steps(
         with object_state.all_or_nothing(written, reshaped=bound):
             reports = [write(body, planned, params) for planned in plans]
     warnings = source_warnings(body, reports[0].native)
-    return Report(body.name, reports, warnings, [failure.sentence for failure in failures])
+    return Report(body.name, params.method, reports, warnings, [failure.sentence for failure in failures])
 
 
 def _read(

@@ -22,6 +22,7 @@ class Body:
     `objects` are the meshes that are its body, the picked one first; `rigs` the armatures that deform it. The rows over
     `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks), each carried
     over by itself. `chosen` names the groups to be written. `opposite` has the other side's bone of every bone.
+    `hidden` names what hides a part of the surface, and the points (n, 3) there.
     """
 
     object: bpy.types.Object
@@ -34,6 +35,7 @@ class Body:
     field_weights: Rows
     chosen: set[str]
     opposite: dict[str, str]
+    hidden: tuple[str, NDArray[np.float32]] | None = None
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -77,6 +79,7 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
     fields = [name for name in chosen if name not in bones]
     with shapes.looked_at(objects, params.geometry):
         seen = [shapes.read_source(obj, params.geometry, bones + fields) for obj in objects]
+        hidden = [shapes.masked(obj, params.geometry) for obj in objects]
     geometry = parts.united([shape.geometry for shape, _ in seen])
     mesh.check_faces(source, geometry)
     rows = parts.united_rows([rows for _, rows in seen])
@@ -92,6 +95,7 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
         field_weights=field_weights,
         chosen=set(chosen),
         opposite=sides.opposites(rigs[0] if rigs else None, bones),
+        hidden=next((each for each in hidden if each), None),
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import armature, mesh, mirror, sides, vertex_groups
+from ..scene import armature, editable, mesh, mirror, sides, vertex_groups
 from ..scene.error import SceneError
 from .inputs import Body, Garment
 from .params import TransferParams
@@ -35,10 +35,8 @@ def target_problem(
         return f"{target.name} is source and target at once: pick another source or deselect it"
     if target.type != "MESH":
         return f"{target.name} is not a mesh: deselect it or convert it"
-    for data in (target, target.data):
-        if not data.is_editable:
-            origin = data.library.filepath if data.library else "another file"
-            return f"{target.name} is linked from {origin}: make it local or a library override with its mesh"
+    if lost := editable.problem(target):
+        return lost
     if not params.make_single_user:
         for other in (source, *targets):
             if other.data == target.data and other != target:
@@ -48,7 +46,7 @@ def target_problem(
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
-    found = [_source_mirror(body)] if _source_mirror(body) else []
+    found = [sentence for sentence in (_source_mirror(body), _envelopes(body)) if sentence]
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
         found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
@@ -93,6 +91,12 @@ def _shear(body: Body, garment: Garment) -> str:
 def _mirror(body: Body, garment: Garment) -> str:
     """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
     obj, shape = garment.object, garment.shape
+    posed = mirror.after_the_pose(obj)
+    if posed:
+        return (
+            f"The modifier {posed[0].name} of {obj.name} comes after the armature, so that the half it makes mirrors "
+            "the pose of the other: move it above the Armature modifier and transfer again"
+        )
     found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
     wrong = [reflection for reflection in found if not mirror.is_right(reflection, body.armature, body.opposite)]
     if not wrong:
@@ -113,8 +117,27 @@ def _mirror(body: Body, garment: Garment) -> str:
     )
 
 
+def _envelopes(body: Body) -> str:
+    """What moves the body beside its weights moves no garment in the same way."""
+    for obj in body.objects:
+        phrase = armature.envelopes(obj)
+        if phrase:
+            return (
+                f"{obj.name} {phrase}, which its weights do not tell, so garments will move otherwise: "
+                "bind it by Vertex Groups alone and transfer again"
+            )
+    return ""
+
+
 def _source_mirror(body: Body) -> str:
     """Blender's mirroring leaves weights of such names on the side they were painted for."""
+    posed = [(obj, modifier) for obj in body.objects for modifier in mirror.after_the_pose(obj)]
+    if posed:
+        obj, modifier = posed[0]
+        return (
+            f"The modifier {modifier.name} of {obj.name} comes after the armature and mirrors its pose, which no "
+            "weights can follow: move it above the Armature modifier"
+        )
     name = sides.unflippable(body.opposite)
     mirrored = [obj for obj in body.objects if mirror.before_the_pose(obj)]
     if not mirrored or not name:
@@ -138,7 +161,7 @@ def _unseen(garment: Garment) -> str:
 
 
 def _pose(body: Body, garment: Garment, params: TransferParams) -> str:
-    follows = armature.find(garment.object)
+    follows = armature.follows_any(garment.object, body.rigs)
     if params.geometry == "CURRENT" or follows or body.armature is None or not armature.is_posed(body.armature):
         return ""
     return (
@@ -148,9 +171,10 @@ def _pose(body: Body, garment: Garment, params: TransferParams) -> str:
 
 
 def _rig(body: Body, garment: Garment) -> str:
-    rig = armature.find(garment.object)
-    if rig is None or rig in body.rigs:
+    rigs = armature.rigs(garment.object)
+    if not rigs or set(rigs) & set(body.rigs):
         return ""
+    rig = rigs[0]
     missing = [name for name in body.bones if name in body.chosen and name not in rig.data.bones]
     if not missing:
         return ""

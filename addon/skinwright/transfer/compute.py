@@ -25,6 +25,7 @@ class Result:
     """The new rows over `names`, for the vertices marked in `written`.
 
     `matched` (V,) and `report` are the library's own answer; `report` covers all that was solved with this target.
+    `islands` (V,) number the loose parts, if nothing matches in one of them.
     """
 
     matched: NDArray[np.bool_]
@@ -33,6 +34,7 @@ class Result:
     rows: Rows
     written: NDArray[np.bool_]
     seconds: float
+    islands: NDArray[np.uint32] | None = None
 
 
 @dataclass(frozen=True)
@@ -127,10 +129,14 @@ def _compute_group(
         rows = [csr.beside(left, len(body.fields), right) for left, right in zip(field_rows, rows, strict=True)]
         names = [body.fields + each for each in names]
     seconds = (time.perf_counter() - start) / len(garments)
-    return [
+    results = [
         to_result(body, garment, answer, name, row, seconds)
         for garment, answer, name, row in zip(garments, answers, names, rows, strict=True)
     ]
+    if not results[0].report["unmatched_islands"]:
+        return results
+    parts = np.split(prepared.islands, np.cumsum([len(result.matched) for result in results], dtype=np.int64)[:-1])
+    return [replace(result, islands=part) for result, part in zip(results, parts, strict=True)]
 
 
 def to_result(body: Body, garment: Garment, answer: Answer, names: list[str], rows: Rows, seconds: float) -> Result:

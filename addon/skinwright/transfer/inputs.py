@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, binding, mask, mesh, mirror, shapes, symmetry, vertex_groups
+from ..scene import armature, binding, mask, mesh, mirror, modifiers, shapes, symmetry, vertex_groups
 from ..scene.error import SceneError
 from . import completion, merging
 from .body import Body, read_body
@@ -26,7 +26,8 @@ class Garment:
     which the pose leads to what was seen. `locks` are all its locked groups. `names` are the body's bones,
     then the target's other bones; of these columns `held` marks those that stay as they are, `chosen` those that come
     from the body, and `opposite` has the other side's. The old weights, over `names` and the body's fields, are empty
-    where they take no part. `distance` is the one in force if the target's size tells nothing of it.
+    where they take no part. `distance` is the one in force if the target's size tells nothing of it; vertices closer
+    than `welded` are one by the target's modifiers.
     """
 
     object: bpy.types.Object
@@ -43,6 +44,7 @@ class Garment:
     before: Rows
     fields_before: Rows
     distance: float | None
+    welded: float
     seconds: float
 
     @property
@@ -79,6 +81,7 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
         before=vertex_groups.read(target, names if mixed or held.any() else []),
         fields_before=vertex_groups.read(target, body.fields if params.mix_factor < 1 else []),
         distance=_wire_distance(shape.geometry, body, params),
+        welded=modifiers.welded(target) * float(np.abs(np.linalg.det(shape.matrix[:3, :3]))) ** (1 / 3),
         seconds=time.perf_counter() - start,
     )
     _check_locks(garment)
@@ -102,7 +105,7 @@ def _is_bound_in_pose(target: bpy.types.Object, body: Body, names: list[str], pa
     if params.geometry != "CURRENT" or not any(armature.is_posed(rig) for rig in body.rigs):
         return False
     follows = set(armature.rigs(target)) & set(body.rigs)
-    if not follows and (armature.find(target) or not params.add_armature):
+    if not follows and (armature.follows_any(target, body.rigs) or not params.add_armature):
         return False  # another armature moves it, or none will
     if follows and (vertex_groups.read(target, names).values > 0).any():
         return False

@@ -1,6 +1,7 @@
 """The settings of a transfer as plain values: what the panel, a script and a JSON file have in common."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any, Literal
 
@@ -14,6 +15,7 @@ IslandPolicy = Literal["bridge", "nearest", "rigid", "skip"]
 Method = Literal["paper", "confidence"]
 SmallIslands = Literal["auto", "rigid", "solved"]
 Reading = Literal["STEER", "PAINTED"]
+THRESHOLDS = {"max_distance", "relative_max_distance", "max_normal_angle", "match_flipped_normals"}
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,13 @@ class TransferParams(Params):
                 "The shapes as they are posed and deformed now; what does not follow the pose yet is bound in it",
             ),
             "AS_SHOWN": (
-                "As Shown, in Rest Pose",
+                "As Shown, at Rest",
                 "The shapes with shape keys and modifiers, but not as they are posed",
             ),
         },
     )
     method: Method = setting(
-        "paper",
+        "confidence",
         "Method",
         "How vertices take weights from the source",
         choices={
@@ -231,7 +233,7 @@ class TransferParams(Params):
     )
     replace_others: bool = setting(
         False,
-        "Replace Other Deformers",
+        "Replace Deformers",
         "End what else moves a target or overrules its weights: bone parents, constraints, other armatures, modifiers",
     )
     skip_failing: bool = setting(
@@ -249,15 +251,24 @@ class TransferParams(Params):
         return declared.native_keywords(self)
 
 
+def means_thresholds(given: Iterable[str]) -> bool:
+    """Whether thresholds are named and no method: then the one that has thresholds is meant, not the default."""
+    names = set(given)
+    return "method" not in names and not names.isdisjoint(THRESHOLDS)
+
+
 def from_json(settings: Any) -> TransferParams:
     """Settings from a JSON object: the names of TransferParams, `max_normal_angle` in degrees, `mask` an object.
 
+    Thresholds without a method mean the method `paper`.
     Raises ValueError for a name that is none of them or a value of another type, SettingError for one out of range.
     """
     if isinstance(settings, dict) and isinstance(settings.get("evaluated"), bool):  # what `geometry` was called
         evaluated = settings["evaluated"]
         rest = {name: value for name, value in settings.items() if name != "evaluated"}
         settings = {"geometry": "CURRENT" if evaluated else "REST"} | rest
+    if isinstance(settings, dict) and means_thresholds(settings):
+        settings = {"method": "paper"} | settings
     return declared.from_json(TransferParams, settings)
 
 

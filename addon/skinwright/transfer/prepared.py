@@ -16,6 +16,8 @@ from .params import TransferParams
 
 # Without thresholds, what is farther away than this share of the body's diagonal is in the wrong place or unit.
 _OUT_OF_REACH = 0.5
+# Of the target's diagonal: as far as the setting goes.
+_WIDEST_WELD = 0.01
 
 
 class Prepared:
@@ -28,9 +30,9 @@ class Prepared:
         self.garments = garments
         self.name = " + ".join(garment.object.name for garment in garments)
         united = parts.united([garment.geometry for garment in garments])
-        self._settings = self._keywords(params)
         self._shapes = (united, body.geometry)
         self._frame = body.unturned
+        self._settings = self._keywords(params)
         self._inpainting = native.Inpainting(
             source,
             self.name,
@@ -102,6 +104,10 @@ class Prepared:
         """The settings of a solve."""
         settings = params.native() | {"average_ties": True}  # mirrored places are to get mirrored rows
         del settings["threads"]
+        welded = max(garment.welded for garment in self.garments)
+        if welded:
+            share = welded / max(_diagonal(self._shapes[0], self._frame), 1e-30)
+            settings["relative_weld_tolerance"] = min(max(params.relative_weld_tolerance, share), _WIDEST_WELD)
         distances = [garment.distance for garment in self.garments]
         return settings if None in distances else settings | {"max_distance": max(distances)}  # type: ignore[type-var]
 

@@ -12,6 +12,7 @@ from .. import csr
 from ..csr import Rows
 from ..reporting import GarmentReport
 from ..scene import armature, binding, followers, mesh, smoothing, vertex_groups
+from . import afterwards
 from .checks import garment_warnings
 from .compute import Result
 from .inputs import Body, Garment
@@ -53,8 +54,8 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
     vertex_groups.write(target, names, rows, vertices)
     vertex_groups.ensure(target, sorted({body.opposite.get(name, name) for name in names} & set(body.bones)))
     warnings += _let_weights_rule(body, garment, names, params)
-    warnings += _short_rows(garment, vertices)
-    attached = params.add_armature and bool(body.rigs) and armature.find(target) is None
+    warnings += afterwards.warnings(body, garment, result)
+    attached = params.add_armature and bool(body.rigs) and not armature.follows_any(target, body.rigs)
     if attached:
         armature.attach(target, body.object)
     warnings += _smooth(body, target, params)
@@ -74,23 +75,8 @@ def _let_weights_rule(body: Body, garment: Garment, names: list[str], params: Tr
             follower.end()
         return []
     return [
-        f"{target.name} {follower.phrase}: turn on Replace Other Deformers if the weights alone are to move it"
+        f"{target.name} {follower.phrase}: turn on Replace Deformers if the weights alone are to move it"
         for follower in found
-    ]
-
-
-def _short_rows(garment: Garment, vertices: NDArray[np.integer]) -> list[str]:
-    """Vertices that follow nothing but locked bones, which the lock keeps from them."""
-    if not garment.held.any():
-        return []
-    sums = csr.row_sums(vertex_groups.read(garment.object, garment.names))[vertices]
-    short = int((sums < 1 - 1e-3).sum())
-    if not short:
-        return []
-    locked = ", ".join(sorted(garment.locks & set(garment.names)))
-    return [
-        f"The weights of {short} vertices of {garment.object.name} sum to less than 1, as they would follow locked "
-        f"groups: unlock {locked}"
     ]
 
 

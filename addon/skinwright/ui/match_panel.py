@@ -28,7 +28,7 @@ class SKINWRIGHT_PT_match(Tab, Panel):
     """What would match, and the artist's word on it."""
 
     bl_label = "Match Mask"
-    bl_order = 1
+    bl_order = 3
 
     def draw(self, context: Context) -> None:
         """Painting shows its own buttons."""
@@ -71,7 +71,7 @@ class SKINWRIGHT_PT_overlay(Tab, Panel):
     """Colours over the mesh."""
 
     bl_label = "Overlay"
-    bl_order = 2
+    bl_order = 4
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:

@@ -36,7 +36,7 @@ class SKINWRIGHT_PT_transfer(Tab, Panel):
     """Source and button; all else has a default that does."""
 
     bl_label = "Transfer Weights"
-    bl_order = 0
+    bl_order = 1
 
     def draw_header_preset(self, _context: Context) -> None:
         """The presets' button, on the right of the header."""

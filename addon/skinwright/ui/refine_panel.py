@@ -14,7 +14,7 @@ class SKINWRIGHT_PT_refine(Tab, Panel):
     """Preview and the two ways to bake."""
 
     bl_label = "Refine Skin"
-    bl_order = 6
+    bl_order = 7
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:

@@ -16,7 +16,7 @@ class SKINWRIGHT_PT_result(Tab, Panel):
     """What the last operator said."""
 
     bl_label = "Last Result"
-    bl_order = 0
+    bl_order = 2
 
     @classmethod
     def poll(cls, _context: Context) -> bool:

@@ -40,7 +40,7 @@ class SKINWRIGHT_PT_retarget(Tab, Panel):
     """Source and button; all else has a default that does."""
 
     bl_label = "Retarget Weights"
-    bl_order = 4
+    bl_order = 6
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:

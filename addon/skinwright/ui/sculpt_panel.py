@@ -11,7 +11,7 @@ class SKINWRIGHT_PT_sculpt(Tab, Panel):
     """One button, and while it runs what the last stroke did."""
 
     bl_label = "Sculpt Weights"
-    bl_order = 3
+    bl_order = 5
 
     def draw(self, context: Context) -> None:
         """While sculpting, the ways to end it."""

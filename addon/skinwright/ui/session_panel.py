@@ -15,7 +15,8 @@ class SKINWRIGHT_PT_session(Tab, Panel):
     """Shown only while weights are sculpted or the mask is painted."""
 
     bl_label = "Session"
-    bl_order = -1
+    # Blender takes numbers below 0 for 0.
+    bl_order = 0
 
     @classmethod
     def poll(cls, _context: Context) -> bool:

@@ -37,7 +37,7 @@ class SKINWRIGHT_PT_stored(Tab, Panel):
             row.operator("skinwright.restore_weights", text="", icon="LOOP_BACK").state = str(number)
         if found:
             row = layout.row(align=True)
-            row.label(text=f"{len(found)} states, {keeping.size(obj) / 1024:,.0f} KiB")
+            row.label(text=f"{len(found)} state{'s' * (len(found) != 1)}, {keeping.size(obj) / 1024:,.0f} KiB")
             row.operator("skinwright.forget_weights", text="", icon="TRASH")
 
 

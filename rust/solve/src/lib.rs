@@ -34,7 +34,10 @@ use glam::Vec3;
 
 use accuracy::{backward_error, defect};
 use fronts::multifrontal::Multifrontal;
+pub use substitute::forward::MOST_COLUMNS;
 pub use substitute::solution::{RightHandSides, Solution};
+use substitute::sparse::Layout;
+pub use substitute::sparse::{SparseRows, Term};
 use supernodal::Supernodal;
 
 /// Lower triangle (diagonal included) of a symmetric matrix, compressed by column, rows ascending.
@@ -196,22 +199,22 @@ impl Cholesky {
         }
     }
 
-    /// Solves for all right-hand sides where the solution matters: where they are zero and the solution around has died away
-    /// to the `negligible` magnitude, it is zero. Nothing is measured or refined, so a factor should have proved itself in
-    /// [`Self::solve`] before.
-    pub fn solve_nearby(&self, rhs: &RightHandSides, negligible: f64) -> Solution<'_> {
-        let substitute = self.substitute.get().and_then(Option::as_ref);
-        substitute.unwrap_or(&self.factor).solve(rhs, Some(negligible))
+    /// Solves where the solution matters, for right-hand sides that are mostly zero. Nothing is measured or refined, so a
+    /// factor should have proved itself in [`Self::solve`] before.
+    pub fn sparse(&self) -> SparseSolver<'_> {
+        let factor = self.substitute.get().and_then(Option::as_ref).unwrap_or(&self.factor);
+        let tree = if let Factor::Multifrontal(factor) = factor { Some(factor.tree()) } else { None };
+        SparseSolver { factor, layout: Layout { tree, unknowns: self.matrix.size() } }
     }
 
     fn solve_with<'f>(&self, factor: &'f Factor, rhs: &RightHandSides) -> Solution<'f> {
-        let mut solution = factor.solve(rhs, None);
+        let mut solution = factor.solve(rhs);
         solution.residual = backward_error(&self.matrix, &solution, rhs);
         for _ in 0..REFINEMENTS {
             if solution.residual <= ACCURATE {
                 break;
             }
-            solution.add(&factor.solve(&defect(&self.matrix, &solution, rhs), None));
+            solution.add(&factor.solve(&defect(&self.matrix, &solution, rhs)));
             solution.residual = backward_error(&self.matrix, &solution, rhs);
         }
         solution
@@ -251,11 +254,49 @@ impl Factor {
         Ok(Self::Supernodal(Box::new(Supernodal::factor_until(matrix, stop)?)))
     }
 
-    fn solve(&self, rhs: &RightHandSides, negligible: Option<f64>) -> Solution<'_> {
+    fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {
         match self {
-            Self::Multifrontal(factor) if rhs.columns > 0 => factor.solve(rhs, negligible),
+            Self::Multifrontal(factor) if rhs.columns > 0 => factor.solve(rhs),
             Self::Supernodal(factor) if rhs.columns > 0 => factor.solve(rhs),
             _ => Solution { place: None, parts: Vec::new(), residual: 0.0 },
+        }
+    }
+}
+
+/// A factorisation that solves for rows which are mostly zero, see [`SparseRows`].
+#[derive(Debug, Clone, Copy)]
+pub struct SparseSolver<'f> {
+    factor: &'f Factor,
+    layout: Layout<'f>,
+}
+
+impl<'f> SparseSolver<'f> {
+    /// Rows made of what `append` adds to the list for each unknown: columns (below [`MOST_COLUMNS`]) and values, those of
+    /// equal columns to be summed.
+    pub fn collect(&self, append: impl Fn(usize, &mut Vec<(u32, f64)>) + Sync) -> SparseRows<'f> {
+        self.layout.collect(append)
+    }
+
+    /// The sum of `terms`, each with a factor for every unknown.
+    pub fn sum(&self, terms: &[Term<'_, 'f>]) -> SparseRows<'f> {
+        self.layout.sum(terms)
+    }
+
+    /// Solves for `rows` up to a magnitude that counts as zero, the `least` of each unknown. What is smaller may be left out;
+    /// once `stop` is set the answer means nothing.
+    pub fn solve(
+        &self,
+        rows: &SparseRows<'f>,
+        least: impl Fn(usize) -> f64 + Sync,
+        stop: &AtomicBool,
+    ) -> SparseRows<'f> {
+        match self.factor {
+            Factor::Multifrontal(factor) => factor.solve_sparse(rows, &least, stop),
+            factor => {
+                let rhs = rows.to_dense(self.layout.unknowns);
+                let solution = factor.solve(&rhs);
+                self.layout.only_front(|k| solution.row(k), least, rhs.columns)
+            }
         }
     }
 }
@@ -287,12 +328,41 @@ mod tests {
     fn leaves_out_what_has_died_away() {
         let (matrix, positions) = chain(20_000);
         let factor = Cholesky::factor(matrix, &positions).unwrap();
-        let rhs = RightHandSides::sparse(20_000, 1, &[100], vec![1.0]);
-        let (whole, near) = (factor.solve(&rhs), factor.solve_nearby(&rhs, 1e-9));
-        let values = |solution: &Solution<'_>| (0..20_000).flat_map(|i| solution.row(i)).collect::<Vec<f64>>();
-        let (whole, near) = (values(&whole), values(&near));
-        assert!(whole.iter().zip(&near).all(|(a, b)| (a - b).abs() <= 1e-9));
-        assert!(near.iter().filter(|&&x| x == 0.0).count() > whole.iter().filter(|&&x| x == 0.0).count() + 5_000);
+        let whole = factor.solve(&RightHandSides::sparse(20_000, 1, &[100], vec![1.0]));
+        let sparse = factor.sparse();
+        let data = sparse.collect(|i, row| row.extend((i == 100).then_some((37, 1.0))));
+        let near = sparse.solve(&data, |_| 1e-9, &NEVER);
+        let mut stored = 0;
+        for i in 0..20_000 {
+            let row: Vec<(u32, f64)> = near.row(i).collect();
+            let value: f64 = row.iter().map(|&(_, value)| value).sum();
+            assert!(row.iter().all(|&(column, _)| column == 37));
+            assert!((value - whole.row(i).next().unwrap()).abs() <= 1e-9);
+            stored += row.len();
+        }
+        assert!((100..15_000).contains(&stored), "{stored}");
+    }
+
+    #[test]
+    fn solves_sparse_rows_as_any_others() {
+        for (n, method) in [(3000, Method::Multifrontal), (200, Method::Supernodal)] {
+            let (matrix, positions) = chain(n);
+            let factor = Cholesky::factor_with(method, matrix, &positions).unwrap();
+            let value =
+                |i: usize, column: usize| if i / 40 % 50 == column { (i * column) as f64 % 7.0 - 3.0 } else { 0.0 };
+            let dense = (0..n).flat_map(|i| (0..60).map(move |column| 3.0 * value(i, column))).collect();
+            let whole = factor.solve(&RightHandSides::dense(n, 60, dense));
+            let sparse = factor.sparse();
+            let data =
+                sparse.collect(|i, row| row.extend((0..60).map(|c| (c as u32, value(i, c))).filter(|x| x.1 != 0.0)));
+            let data = sparse.sum(&[(&data, &|_| 1.0), (&data, &|_| 2.0)]);
+            let found = sparse.solve(&data, |_| 0.0, &NEVER);
+            for i in 0..n {
+                let mut wanted: Vec<f64> = whole.row(i).collect();
+                found.row(i).for_each(|(column, value)| wanted[column as usize] -= value);
+                assert!(wanted.iter().all(|difference| difference.abs() < 1e-12), "{i}");
+            }
+        }
     }
 
     #[test]

@@ -95,7 +95,8 @@ def steps(window: Window) -> Steps:
         assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
         only(rig)
         bpy.ops.object.mode_set(mode="POSE")
-        for bone in rig.data.bones:
+        # From Blender 5.0 on it is the pose bone that is selected.
+        for bone in rig.pose.bones if bpy.app.version >= (5, 0, 0) else rig.data.bones:
             bone.select = bone.name == "Lower"
         rig.data.bones.active = rig.data.bones["Lower"]
         bpy.ops.ed.undo_push(message="Pose mode")
@@ -163,4 +164,5 @@ def steps(window: Window) -> Steps:
     assert sorted(obj.name for obj in bpy.data.objects) == ["Rig", "Sleeve"], list(bpy.data.objects)
 
 
-start(steps)
+if __name__ == "__main__":
+    start(steps)

@@ -129,8 +129,9 @@ def row(name: str, parts: list[str]) -> None:
 
 
 def previews(window: Window, name: str, key: str, values: list[float]) -> Steps:
-    """The match under several values of a setting."""
+    """The match under several values of a threshold."""
     parts = []
+    bpy.context.scene.skinwright.transfer.method = "PAPER"
     for number, value in enumerate(values):
         setattr(bpy.context.scene.skinwright.transfer, key, value)
         with window.context():
@@ -191,8 +192,9 @@ def options(window: Window) -> Steps:
     yield from previews(window, "option_angle", "max_normal_angle", [math.radians(angle) for angle in (5, 35, 80)])
     wear(window, SKIRT)
     look(window, 0.7, 2.4, SIDE)
-    smoothness = [{"relative_smoothness_length": 0.0}, {}, {"relative_smoothness_length": 0.3}]
+    smoothness = [{"relative_smoothness_length": length, "method": "PAPER"} for length in (0.0, 0.05, 0.3)]
     yield from posed(window, "option_smoothness", smoothness, STEP)
+    yield from posed(window, "option_softness", [{"softness": softness} for softness in (0.2, 0.7, 3.0)], STEP)
     yield from posed(window, "option_limit", [{"max_influences": 1}, {"max_influences": 2}, {}], STEP)
     yield from posed(window, "option_method", [{"method": "PAPER"}, {"method": "CONFIDENCE"}], STEP)
 

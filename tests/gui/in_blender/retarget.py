@@ -11,22 +11,9 @@ import dress
 import numpy as np
 from driver import EXTENSION, Steps, Window, enable, record, start, until
 from painting import look
+from panels import open_only, ours
 
 BONES = 6
-
-
-def open_only(name: str) -> None:
-    """The panels of one module without their arrows closed, and none else of the tab."""
-    module = import_module(f"{EXTENSION}.ui.{name}")
-    kept = [cls for cls in vars(module).values() if isinstance(cls, type) and issubclass(cls, bpy.types.Panel)]
-    kept = [cls for cls in kept if cls.is_registered]
-    for cls in reversed([cls for cls in bpy.types.Panel.__subclasses__() if cls.is_registered]):
-        if getattr(cls, "bl_category", "") == "Weights" and cls not in kept and not hasattr(cls, "bl_parent_id"):
-            bpy.utils.unregister_class(cls)
-    for cls in kept:
-        bpy.utils.unregister_class(cls)
-        cls.bl_options = set()
-        bpy.utils.register_class(cls)
 
 
 def other_character(rings: int, around: int, place: float) -> bpy.types.Object:
@@ -56,7 +43,7 @@ def steps(window: Window) -> Steps:
     for obj in bpy.data.objects:
         obj.select_set(obj == other)
     bpy.context.view_layer.objects.active = other
-    open_only("retarget_panel")
+    open_only("retarget_panel", ours())
     yield from window.show_tab("Weights")
     look(window)
     yield 0.5
@@ -97,7 +84,8 @@ def steps(window: Window) -> Steps:
     window.key("ESC")
     yield from until(lambda: jobs.running is None, 60)
     assert runner.result is None and not large.vertex_groups, "Esc came too late or something was written"
-    record["bones"] = len(settings.bone_map)
+    record["bones"] = len(bpy.context.scene.skinwright.retarget.bone_map)
 
 
-start(steps)
+if __name__ == "__main__":
+    start(steps)

@@ -64,9 +64,9 @@ class MaskBrushes(BrushSession):
         """Bit for bit."""
         self.painting.restore()
 
-    def release(self, context: Context) -> None:
+    def release(self, _context: Context) -> None:
         """The overlay as it was."""
-        self.painting.close(context)
+        self.painting.close()
 
 
 def params(context: Context) -> TransferParams:

@@ -21,13 +21,20 @@ class SKINWRIGHT_OT_paint_match_mask(SessionOperator):
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Not beside another session."""
-        reason = brush_session.refusal() or ("" if session_operator.is_orphaned() else refusal(context))
+        reason = brush_session.refusal() or ("" if session_operator.is_orphaned() else _refusal(context))
         cls.poll_message_set(reason)
         return not reason
 
     def make(self, context: Context) -> MaskBrushes:
         """Without a window there is nothing to paint with."""
         return MaskBrushes(context, target(context))
+
+
+def _refusal(context: Context) -> str:
+    """As for every look at the match; and no brush reaches what is hidden."""
+    obj = target(context)
+    hidden = obj is not None and not obj.visible_get()
+    return refusal(context) or (f"{obj.name} is hidden: show it to paint its mask" if obj and hidden else "")
 
 
 class SKINWRIGHT_OT_end_match_mask(Operator):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Context, Event, Object
 
+from ... import jobs
 from ...scene import identity
 
 
@@ -107,15 +108,55 @@ current: BrushSession | None = None
 ended: BrushSession | None = None
 
 FLAGS = ("sculpting", "painting")
+# The objects of all sessions in this file, by Blender's number. A copy made during one, and what comes from another
+# file, may bear a mark as well, which means nothing.
+_begun: set[int] = set()
 
 
 def refusal() -> str:
-    """Why nothing else may write weights now, or nothing: it would pull the ground from under the session."""
+    """Why nothing else may write weights now, or nothing: it would pull the ground from under a session, or under work
+    that goes on in another window."""
+    if jobs.running:
+        return "Other work goes on: wait for its end, or stop it with Esc in its window"
     if current is None or current.orphaned:
         return ""
     return f"{current.label} runs on {current.object.name}: keep or cancel it first"
 
 
+def begin(session: BrushSession) -> None:
+    """The session runs from now on; its object has no mark yet."""
+    global current
+    unmark(marked())
+    _begun.add(session.object.uid)
+    current = session
+
+
+def end(session: BrushSession) -> None:
+    """No session runs, and what undo leads to belongs to the one that ran last."""
+    global current, ended
+    current, ended = None, session
+
+
+def forget() -> None:
+    """Another file: none of its objects has been in a session."""
+    global current, ended
+    current = ended = None
+    _begun.clear()
+
+
+def marked() -> list[Object]:
+    """The objects with a session's mark, whether or not it means anything."""
+    return [obj for obj in bpy.data.objects if any(getattr(obj.skinwright, flag) for flag in FLAGS)]
+
+
 def flagged() -> list[Object]:
     """The objects in a state within a session."""
-    return [obj for obj in bpy.data.objects if any(getattr(obj.skinwright, flag) for flag in FLAGS)]
+    return [obj for obj in marked() if obj.session_uid in _begun]
+
+
+def unmark(objects: list[Object]) -> None:
+    """Take the marks away."""
+    for obj in objects:
+        for flag in FLAGS:
+            if getattr(obj.skinwright, flag):
+                setattr(obj.skinwright, flag, False)

@@ -53,14 +53,13 @@ def end(context: Context, session: BrushSession, ending: Ending, why: str = "") 
     attempts = _Attempts()
     if why:
         attempts.messages.append(Message("ERROR" if ending is Ending.BROKEN else "WARNING", why))
-    brush_session.current = None
-    brush_session.ended = session
+    brush_session.end(session)
     obj = session.target()
     if obj and ending is not Ending.UNDONE:
         attempts.run(_write, context, session, ending, attempts, otherwise=f"{obj.name} could not be restored")
     session.forget()
     attempts.run(session.release, context, otherwise=f"{session.label} left something behind")
-    attempts.run(session.set_flag, False, otherwise=f"{session.label} left a mark")
+    attempts.run(_unmark, otherwise=f"{session.label} left a mark")
     attempts.run(_leave, session, ending, otherwise="The mode is as it was")
     status.clear()
     return attempts.messages
@@ -109,6 +108,11 @@ def _step_of_work(context: Context, session: BrushSession) -> None:
     session.set_flag(False)
     modes.go_to(session.target(), session.mode_before)
     _push(session.label)
+
+
+def _unmark() -> None:
+    """Also the copies that were made of the object meanwhile."""
+    brush_session.unmark(brush_session.marked())
 
 
 def _leave(session: BrushSession, ending: Ending) -> None:

@@ -8,9 +8,13 @@ _JOBS = ("RENDER", "OBJECT_BAKE")
 
 def by_another(context: Context, operator: type[Operator]) -> bool:
     """Whether an operator other than this one holds the input, in any window."""
+    return bool(running(context) - {operator.__name__})
+
+
+def running(context: Context) -> set[str]:
+    """Class names of the operators that take events, in any window. Blender lists None for one whose class has gone."""
     windows = context.window_manager.windows
-    names = {running.bl_idname for window in windows for running in window.modal_operators}
-    return bool(names - {operator.__name__})
+    return {one.bl_idname for window in windows for one in window.modal_operators if one}
 
 
 def is_elsewhere(context: Context, event: Event) -> bool:

@@ -5,7 +5,7 @@ from bpy.app.handlers import load_post, load_post_fail, load_pre, persistent, sa
 
 from ... import reporting
 from ...scene import modes
-from . import brush_session, ending, status
+from . import brush_session, ending, held_input, status
 from .brush_session import BrushSession
 from .ending import Ending
 
@@ -39,8 +39,7 @@ def _watch() -> float | None:
     session = brush_session.current
     if session is None:
         return None
-    running = {operator.bl_idname for window in _windows() for operator in window.modal_operators}
-    if _class_name(session) not in running:
+    if _class_name(session) not in held_input.running(bpy.context):
         orphan(session)
     return _WATCH_SECONDS
 
@@ -81,7 +80,7 @@ def _view(window: bpy.types.Window) -> bpy.types.Area | None:
 def _forget() -> None:
     if brush_session.current:
         brush_session.current.forget()
-    brush_session.current = brush_session.ended = None
+    brush_session.forget()
 
 
 @persistent
@@ -104,12 +103,12 @@ def _after_load(*_arguments: object) -> None:
     _forget()
     reporting.forget()
     status.clear()
-    if brush_session.flagged():
+    marked = brush_session.marked()
+    if marked:
         text = "The file was saved while weights were sculpted or painted: they are as they were then"
         reporting.remember("Skinwright", text)
-    for obj in brush_session.flagged():
-        for flag in brush_session.FLAGS:
-            setattr(obj.skinwright, flag, False)
+    brush_session.unmark(marked)
+    for obj in marked:
         if obj.mode in ("SCULPT", "WEIGHT_PAINT"):
             modes.go_to(obj, "OBJECT")
     # The overlay of a match needs what was prepared for it, which no file holds.
@@ -128,7 +127,7 @@ def _before_save(*_arguments: object) -> None:
         return
     under_brush = obj.mode == session.mode
     _saving = session, under_brush
-    session.set_flag(False)
+    brush_session.unmark(brush_session.marked())
     session.tidy()
     if under_brush:
         modes.go_to(obj, "OBJECT")

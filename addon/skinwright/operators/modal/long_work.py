@@ -6,7 +6,7 @@ from bpy.types import Context, Event, Operator
 
 from ... import jobs, reporting
 from ...errors import Refused, sentence
-from . import timers
+from . import status, timers
 
 TICK_SECONDS = 0.05
 
@@ -74,9 +74,19 @@ class LongWork(Operator):
 
 def _show(context: Context) -> None:
     runner = jobs.running
-    text = f"Skinwright: {runner.progress:.0%}   Esc: stop, nothing is written" if runner else None
-    if context.workspace:
-        context.workspace.status_text_set(text)
-    for area in context.screen.areas if context.screen else ():
-        if area.type == "VIEW_3D":
-            area.tag_redraw()
+    if runner:
+        status.show(context, f"Skinwright: {runner.progress:.0%}   Esc: stop, nothing is written")
+    else:
+        status.clear()
+
+
+def register() -> None:
+    """Nothing runs yet."""
+
+
+def unregister() -> None:
+    """The operators' classes are gone, and Blender has not told those that worked."""
+    if jobs.running:
+        jobs.running.cancel()
+        jobs.running = None
+        status.clear()

@@ -45,11 +45,10 @@ class SessionOperator(Operator):
         except Refused as error:
             self._tell([Message("ERROR", str(error))])
             return None
-        keeping.keep_before([session.target()], session.label)
-        # The way back from the session leads to the first of these steps, the second is where its strokes begin.
-        bpy.ops.ed.undo_push(message=f"Before {session.label}")
-        brush_session.current = session
+        brush_session.begin(session)
         try:
+            # The way back from the session leads to this step, the one below is where its strokes begin.
+            bpy.ops.ed.undo_push(message=f"Before {session.label}")
             session.set_flag(True)
             session.enter(context)
         except BaseException as error:
@@ -171,4 +170,4 @@ def _reason(error: BaseException) -> str:
 
 
 def _show(context: Context, session: BrushSession) -> None:
-    status.show(context, f"{session.label}: {session.news}   {session.keys}")
+    status.show(context, f"{session.label}   {session.keys}   {session.news}")

@@ -103,8 +103,7 @@ def _restore() -> None:
     for obj in brush_session.flagged():
         if session and session.target() == obj:
             session.restore()
-        for flag in brush_session.FLAGS:
-            setattr(obj.skinwright, flag, False)
+        brush_session.unmark([obj])
         if obj.mode in ("SCULPT", "WEIGHT_PAINT"):
             modes.go_to(obj, "OBJECT")
 

@@ -40,17 +40,33 @@ class SKINWRIGHT_OT_live_refine(RefineSettings, SkinwrightOperator):
         others = [other for other in context.selected_objects if other.type == "MESH" and other != obj]
         garments = [other for other in others if armature.find(other) == rig]
         live.start(obj, garments, self.to_params(preferences.threads(context)))
-        return self.tell(f"{obj.name}: live refinement is on, {len(garments)} garments follow", [])
+        follow = "1 garment follows" if len(garments) == 1 else f"{len(garments)} garments follow"
+        return self.tell(f"{obj.name}: live refinement is on, {follow}", [])
 
 
 _busy = False
+# Frames change on another thread then, where nothing may be written.
+_rendering = False
+
+
+@persistent
+def _before_rendering(*_arguments: object) -> None:
+    global _rendering
+    _rendering = True
+
+
+@persistent
+def _after_rendering(*_arguments: object) -> None:
+    """The pose on show is that of the frame before; the next change of it is seen."""
+    global _rendering
+    _rendering = False
 
 
 @persistent
 def _on_change(*_arguments: object) -> None:
     """The pose may have changed. Moving the stand-in makes Blender call this once more, with the same pose."""
     global _busy
-    if live.current and not _busy:
+    if live.current and not _busy and not _rendering:
         _busy = True
         try:
             _attempt(live.update)
@@ -87,6 +103,9 @@ def _on_load(*_arguments: object) -> None:
 
 
 _HANDLERS = {
+    "render_init": _before_rendering,
+    "render_complete": _after_rendering,
+    "render_cancel": _after_rendering,
     "depsgraph_update_post": _on_change,
     "frame_change_post": _on_change,
     "save_pre": _before_saving,

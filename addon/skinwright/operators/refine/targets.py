@@ -4,6 +4,7 @@ from bpy.types import Context, Object
 
 from ... import native
 from ...scene import armature
+from ..modal import brush_session
 
 MODES = {"OBJECT", "POSE"}
 
@@ -27,8 +28,8 @@ def found(context: Context) -> Object:
 
 def refusal(context: Context, purpose: str) -> str:
     """Why nothing can be refined now, or nothing; `purpose` ends the sentence."""
-    if native.problem():
-        return native.problem()
+    if native.problem() or brush_session.refusal():
+        return native.problem() or brush_session.refusal()
     if context.mode not in MODES:
         return f"Go to Object or Pose mode to {purpose}"
     obj = target(context)

@@ -42,7 +42,7 @@ def refusal(context: Context) -> str:
         return "Go to Object or Sculpt mode to sculpt weights"
     if context.object is None or context.object.type != "MESH":
         return "Make the skinned mesh the active object"
-    return ""
+    return "" if context.object.visible_get() else f"{context.object.name} is hidden: show it to sculpt it"
 
 
 def register() -> None:

@@ -3,10 +3,10 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SymmetricMatrix};
+use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SparseRows, SymmetricMatrix};
 
 use super::constraint::Known;
-use super::rows::{KnownRows, Ragged, Row};
+use super::rows::{KnownRows, Row};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -80,13 +80,38 @@ enum Values<'b> {
     /// no energy.
     Constant(f64),
     Solved(Solution<'b>),
-    /// Columns and values of each unknown, and the backward error of the factor.
-    Sparse(Ragged<(u32, f64)>, f64),
+    /// Some columns each, and the backward error of the factor.
+    Sparse(Vec<SparseColumns<'b>>, f64),
 }
 
-impl BlockRows<'_> {
-    /// Only these columns and values of each unknown, others being negligible; `residual` is the factor's backward error.
-    pub(super) fn sparse(rows: Ragged<(u32, f64)>, residual: f64) -> Self {
+/// Some columns of a block, most of their values being zero.
+#[derive(Debug)]
+pub(super) struct SparseColumns<'b> {
+    columns: Vec<u32>,
+    rows: SparseRows<'b>,
+    least: f64,
+}
+
+impl<'b> SparseColumns<'b> {
+    /// `rows` stores the values of `columns`, of which those below the `least` magnitude are left out.
+    pub(super) fn new(columns: Vec<u32>, rows: SparseRows<'b>, least: f64) -> Self {
+        Self { columns, rows, least }
+    }
+
+    fn minimum(&self) -> f64 {
+        let noticeable = self.rows.values().filter(|value| value.abs() >= self.least);
+        noticeable.fold(f64::INFINITY, f64::min)
+    }
+
+    fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let noticeable = self.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
+        noticeable.map(|(slot, value)| (self.columns[slot as usize], value))
+    }
+}
+
+impl<'b> BlockRows<'b> {
+    /// These columns, by column; `residual` is the factor's backward error.
+    pub(super) fn sparse(rows: Vec<SparseColumns<'b>>, residual: f64) -> Self {
         Self { columns: Vec::new(), values: Values::Sparse(rows, residual) }
     }
 
@@ -100,10 +125,20 @@ impl BlockRows<'_> {
         let (constant, solution, sparse) = match &self.values {
             Values::Constant(value) => (Some(*value), None, [].as_slice()),
             Values::Solved(solution) => (None, Some(solution), [].as_slice()),
-            Values::Sparse(rows, _) => (None, None, rows.of(k)),
+            Values::Sparse(rows, _) => (None, None, &rows[..]),
         };
         let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
-        std::iter::zip(self.columns.iter().copied(), values).chain(sparse.iter().copied())
+        std::iter::zip(self.columns.iter().copied(), values)
+            .chain(sparse.iter().flat_map(move |columns| columns.row(k)))
+    }
+
+    /// The smallest value of the block's `count` unknowns.
+    pub fn minimum(&self, count: usize) -> f64 {
+        if let Values::Sparse(rows, _) = &self.values {
+            return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min);
+        }
+        let least = |k| self.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+        (0..count).into_par_iter().with_min_len(256).map(least).reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Backward error of the solve.

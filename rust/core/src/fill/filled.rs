@@ -1,7 +1,5 @@
 //! The rows of all vertices once everything is solved for.
 
-use rayon::prelude::*;
-
 use super::block::{Block, BlockRows};
 use super::constraint::Constraint;
 use super::rows::{KnownRows, Row};
@@ -53,11 +51,7 @@ impl<'a> Filled<'a> {
 
     /// The smallest value solved for, 0 where nothing was.
     pub fn minimum(&self) -> f64 {
-        let least = std::iter::zip(self.blocks, &self.rows).map(|(block, rows)| {
-            let unknowns = (0..block.unknowns().len()).into_par_iter().with_min_len(256);
-            let least = |k| rows.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
-            unknowns.map(least).reduce(|| f64::INFINITY, f64::min)
-        });
+        let least = std::iter::zip(self.blocks, &self.rows).map(|(block, rows)| rows.minimum(block.unknowns().len()));
         least.min_by(f64::total_cmp).unwrap_or(0.0)
     }
 

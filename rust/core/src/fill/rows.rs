@@ -15,12 +15,14 @@ pub struct Ragged<T> {
 
 /// Lists a worker makes at a time.
 const LISTS_A_RUN: usize = 2048;
+/// Likely length of a list.
+const LIKELY: usize = 8;
 
 impl<T: Copy + Send + Sync> Ragged<T> {
     /// `append(i, out)` appends the list of each of `count` vertices to `out`, on several threads.
     pub fn new(count: usize, append: impl Fn(usize, &mut Vec<T>) + Sync) -> Self {
         let run = |first: usize| {
-            let (mut ends, mut values) = (Vec::with_capacity(LISTS_A_RUN), Vec::new());
+            let (mut ends, mut values) = (Vec::with_capacity(LISTS_A_RUN), Vec::with_capacity(LIKELY * LISTS_A_RUN));
             for i in first..(first + LISTS_A_RUN).min(count) {
                 append(i, &mut values);
                 ends.push(values.len());

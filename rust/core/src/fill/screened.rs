@@ -15,13 +15,11 @@
 //! edge scaled by the share t of its change that is to be kept (gradient-domain blending: Pérez, Gangnet, Blake, *Poisson Image
 //! Editing*, SIGGRAPH 2003, doi 10.1145/882262.882269).
 //!
-//! Influence dies away within a few h, so a column is zero in most of the mesh. A few columns are solved at a time, and each
-//! substitution leaves out the subtrees that they do not reach.
+//! Influence dies away within a few h, so a column is zero in most of the mesh, and is not even stored there.
 
-use rayon::prelude::*;
-use skinwright_solve::{RightHandSides, Solution};
+use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver};
 
-use super::block::{Block, BlockRows, Places};
+use super::block::{Block, BlockRows, Places, SparseColumns};
 use super::rows::Ragged;
 use crate::adjacency::NONE;
 use crate::error::Result;
@@ -30,20 +28,17 @@ use crate::progress::Progress;
 
 /// a: how much shorter the two smoothing solves reach than the wanted energy. From 1.25 to 2.5 figures are alike.
 const REACH: f64 = 1.5;
-/// Columns solved together: a vector of numbers in the substitution.
-const WIDTH: usize = 8;
-/// Groups of columns under way at a time, for the sake of memory.
-const GROUPS: usize = 4;
 /// Magnitude that counts as zero between solves.
-const NEGLIGIBLE: f64 = 1e-7;
+const NEGLIGIBLE: f64 = 1e-6;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
+/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+const MANY: usize = 300_000;
+const FEWER_COLUMNS: usize = 16;
+
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
-
-/// Values of a group of columns for one vertex.
-type Values = [f64; WIDTH];
 
 /// The confidence that makes a row with this `mass` trusted over this `length`.
 pub fn confidence(mass: f64, length: f64) -> f64 {
@@ -87,18 +82,15 @@ pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress)
     let accuracy = block.accuracy()?;
     let columns = screened.columns();
     let places = Places::of(&columns).of_column;
-    let groups: Vec<&[u32]> = columns.chunks(WIDTH).collect();
-    let mut found = Vec::with_capacity(groups.len());
-    for (first, groups) in std::iter::zip((0..).step_by(GROUPS), groups.chunks(GROUPS)) {
-        let solve = |(k, columns): (usize, &&[u32])| {
-            progress.check()?;
-            Ok(Group { screened: &screened, columns, places: &places, first: (first + k) * WIDTH }.solve())
-        };
-        found.extend(groups.par_iter().enumerate().map(solve).collect::<Result<Vec<_>>>()?);
-    }
-    let append =
-        |k: usize, out: &mut Vec<(u32, f64)>| found.iter().for_each(|group| out.extend_from_slice(group.of(k)));
-    Ok(BlockRows::sparse(Ragged::new(block.unknowns().len(), append), accuracy))
+    let solver = block.factor.sparse();
+    let solve = |(first, columns): (usize, &[u32])| {
+        let group = Group { screened: &screened, columns, places: &places, first, solver, progress };
+        group.solve().map(|found| SparseColumns::new(columns.to_vec(), found, LEAST))
+    };
+    let together = if block.unknowns().len() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
+    let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
+    let found = groups.map(solve).collect::<Result<_>>()?;
+    Ok(BlockRows::sparse(found, accuracy))
 }
 
 impl<'a> Screened<'a> {
@@ -168,115 +160,64 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
 }
 
 /// A few columns of a block.
-struct Group<'a> {
+struct Group<'a, 'b> {
     screened: &'a Screened<'a>,
     columns: &'a [u32],
     /// Place of every column among the block's.
     places: &'a [u32],
     /// The place of the group's first column.
     first: usize,
+    solver: SparseSolver<'b>,
+    progress: &'a Progress,
 }
 
-/// s and g of a group of columns.
-struct Data {
-    /// (unknowns and vertices around)
-    rows: Vec<Values>,
-    has_row: Vec<bool>,
-    /// (unknowns)
-    added: Vec<Values>,
-}
-
-impl Group<'_> {
-    /// Columns and values of the unknowns.
-    fn solve(&self) -> Ragged<(u32, f64)> {
+impl<'b> Group<'_, 'b> {
+    /// Values of the unknowns.
+    fn solve(&self) -> Result<SparseRows<'b>> {
         let Screened { confidence, mass, least_ratio, .. } = self.screened;
-        let data = self.data();
-        let pulled = |k: usize, towards: &Values| combine(&data.added[k], confidence[k], towards);
-        let first = self.substitute(|k| pulled(k, &data.rows[k]), NEGLIGIBLE);
-        let first = |k: usize| settled(&first, k);
-        let second = self.substitute(|k| pulled(k, &first(k)), NEGLIGIBLE);
-        let second = |k: usize| settled(&second, k);
-        let defect = |k: usize| {
-            let scale = confidence[k] * confidence[k] / mass[k];
-            let (given, first, second) = (&data.rows[k], first(k), second(k));
-            std::array::from_fn(|c| scale * ((given[c] - second[c]) / (REACH * REACH) + first[c] - second[c]))
-        };
-        let correction = self.substitute(defect, NEGLIGIBLE * least_ratio);
-        let corrected = |k: usize| {
-            let least = NEGLIGIBLE * confidence[k].max(mass[k] * least_ratio);
-            let step = values(&correction, k).map(|x| if (mass[k] * x).abs() > least { mass[k] * x } else { 0.0 });
-            combine(&step, 1.0, &pulled(k, &second(k)))
-        };
-        let answer = self.substitute(corrected, NEGLIGIBLE);
-        Ragged::new(self.screened.count(), |k, out| {
-            let row = std::iter::zip(self.columns, values(&answer, k));
-            out.extend(row.filter(|(_, value)| value.abs() >= LEAST).map(|(&column, value)| (column, value)));
-        })
+        let solver = self.solver;
+        let (given, added) =
+            (solver.collect(|k, out| self.append(k, 1.0, out)), solver.collect(|k, out| self.add(k, out)));
+        let (once, pull) = (|_: usize| 1.0, |k: usize| confidence[k]);
+        let first = self.substitute(&solver.sum(&[(&given, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
+        let second = self.substitute(&solver.sum(&[(&first, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
+        let scale = |k: usize| confidence[k] * confidence[k] / mass[k];
+        let to_given = |k: usize| scale(k) / (REACH * REACH);
+        let to_second = |k: usize| -scale(k) * (1.0 / (REACH * REACH) + 1.0);
+        let defect = solver.sum(&[(&given, &to_given), (&first, &scale), (&second, &to_second)]);
+        drop((given, first));
+        let least = |k: usize| NEGLIGIBLE * (confidence[k] / mass[k]).max(*least_ratio);
+        let correction = self.substitute(&defect, least)?;
+        drop(defect);
+        let corrected = solver.sum(&[(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)]);
+        drop((correction, second, added));
+        self.substitute(&corrected, |_| LEAST)
     }
 
-    fn data(&self) -> Data {
-        let (screened, count) = (self.screened, self.screened.count());
-        let mut data =
-            Data { rows: vec![[0.0; WIDTH]; screened.vertices().len()], has_row: Vec::new(), added: Vec::new() };
-        data.has_row = vec![false; data.rows.len()];
-        for local in screened.vertices() {
-            for &(column, value) in screened.row(local) {
-                let slot = (self.places[column as usize] as usize).wrapping_sub(self.first);
-                if slot < WIDTH {
-                    data.rows[local][slot] = value;
-                    data.has_row[local] = true;
-                }
-            }
-        }
-        data.added = vec![[0.0; WIDTH]; count];
-        for k in 0..count {
-            self.add(&mut data, k);
-        }
-        data
+    fn substitute(&self, rows: &SparseRows<'b>, least: impl Fn(usize) -> f64 + Sync) -> Result<SparseRows<'b>> {
+        let found = self.solver.solve(rows, least, self.progress.stop());
+        self.progress.check().map(|()| found)
     }
 
-    /// Adds up g of unknown `k`.
-    fn add(&self, data: &mut Data, k: usize) {
+    /// Appends the row given for a vertex, unknown or around, times a factor.
+    fn append(&self, local: usize, factor: f64, out: &mut Vec<(u32, f64)>) {
+        let columns = 0..self.columns.len();
+        out.extend(self.screened.row(local).iter().filter_map(|&(column, value)| {
+            let slot = (self.places[column as usize] as usize).wrapping_sub(self.first);
+            columns.contains(&slot).then_some((slot as u32, factor * value))
+        }));
+    }
+
+    /// Appends what g of unknown `k` is the sum of.
+    fn add(&self, k: usize, out: &mut Vec<(u32, f64)>) {
+        let kept = self.screened.kept.of(k);
+        if !kept.is_empty() {
+            self.append(k, kept.iter().map(|&(_, weight)| weight).sum(), out);
+            kept.iter().for_each(|&(j, weight)| self.append(j as usize, -weight, out));
+        }
         let boundary = &self.screened.block.boundary;
-        for &(j, weight) in self.screened.kept.of(k) {
-            if data.has_row[k] || data.has_row[j as usize] {
-                let change: Values = std::array::from_fn(|c| data.rows[k][c] - data.rows[j as usize][c]);
-                data.added[k] = combine(&data.added[k], weight, &change);
-            }
-        }
         for at in boundary.starts[k]..boundary.starts[k + 1] {
-            let around = self.screened.count() + boundary.columns[at] as usize;
-            if data.has_row[around] {
-                data.added[k] = combine(&data.added[k], -boundary.values[at], &data.rows[around]);
-            }
+            self.append(self.screened.count() + boundary.columns[at] as usize, -boundary.values[at], out);
         }
     }
-
-    fn substitute(&self, right_hand_side: impl Fn(usize) -> Values, negligible: f64) -> Solution<'_> {
-        let count = self.screened.count();
-        let (mut rows, mut values) = (Vec::new(), Vec::new());
-        for k in 0..count {
-            let row = right_hand_side(k);
-            if row != [0.0; WIDTH] {
-                rows.push(k as u32);
-                values.extend_from_slice(&row);
-            }
-        }
-        let right_hand_sides = RightHandSides::sparse(count, WIDTH, &rows, values);
-        self.screened.block.factor.solve_nearby(&right_hand_sides, negligible)
-    }
-}
-
-fn combine(row: &Values, factor: f64, other: &Values) -> Values {
-    std::array::from_fn(|c| row[c] + factor * other[c])
-}
-
-/// The solution for one unknown.
-fn values(solution: &Solution<'_>, k: usize) -> Values {
-    std::array::from_fn(|c| solution.leading(k)[c])
-}
-
-/// The same without what is negligible.
-fn settled(solution: &Solution<'_>, k: usize) -> Values {
-    values(solution, k).map(|x| if x.abs() > NEGLIGIBLE { x } else { 0.0 })
 }

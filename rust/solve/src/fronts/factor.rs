@@ -53,12 +53,12 @@ struct Factor<'a> {
 impl Visit for Factor<'_> {
     type Error = Failure;
 
-    fn store_len(&self, front: &Front) -> usize {
-        front.panel_len()
+    fn store_len(&self, index: usize) -> usize {
+        self.tree.fronts[index].panel_len()
     }
 
-    fn subtree_store_len(&self, front: &Front) -> usize {
-        front.subtree_panels
+    fn subtree_store_len(&self, index: usize) -> usize {
+        self.tree.fronts[index].subtree_panels
     }
 
     fn passed_len(&self, index: usize) -> usize {

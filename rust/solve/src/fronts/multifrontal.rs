@@ -11,9 +11,10 @@ use crate::fronts::factor::factor;
 use crate::fronts::tree::Tree;
 use crate::ordering::dissection::dissect;
 use crate::ordering::graph::Graph;
-use crate::substitute::backward::{Negligible, backward};
-use crate::substitute::forward::forward;
+use crate::substitute::backward::backward;
+use crate::substitute::forward::{activity, forward};
 use crate::substitute::solution::{Part, RightHandSides, Solution};
+use crate::substitute::sparse::{self, SparseRows};
 use crate::substitute::substitution::Columns;
 use crate::{Failure, SymmetricMatrix};
 
@@ -52,21 +53,36 @@ impl Multifrontal {
         Ok(Some(Self { tree, panels, arch }))
     }
 
-    /// Solves for all columns, some at a time. With a `negligible` magnitude, what lies where right-hand sides are zero and
-    /// the solution around is no larger stays zero.
-    pub(crate) fn solve(&self, rhs: &RightHandSides, negligible: Option<f64>) -> Solution<'_> {
+    /// Solves for all columns, some at a time.
+    pub(crate) fn solve(&self, rhs: &RightHandSides) -> Solution<'_> {
         let part = |first: usize| {
             let count = (rhs.columns - first).min(TOGETHER);
             let width = count.next_multiple_of(BLOCK);
             let mut values = Buffer::zeroed(rhs.size() * width);
-            let columns = Columns { rhs, first, count, width };
-            let has_data = forward(&self.tree, &self.panels, self.arch, columns, &mut values);
-            let negligible = negligible.map(|magnitude| Negligible { has_data: &has_data, magnitude });
-            backward(&self.tree, &self.panels, self.arch, width, negligible, &mut values);
+            let given = Columns { rhs, first, count }.by_front(&self.tree);
+            let active = activity(&self.tree, &given, Some((count, width)));
+            forward(&self.tree, &self.panels, self.arch, &given, &active, Some(width), &mut values);
+            backward(&self.tree, &self.panels, self.arch, width, &mut values);
             Part { values, width, count }
         };
         let parts = (0..rhs.columns).step_by(TOGETHER).map(part).collect();
         Solution { place: Some(&self.tree.place), parts, residual: 0.0 }
+    }
+
+    /// Solves for rows that are mostly zero up to the `least` magnitude of each unknown; see [`sparse::solve`].
+    pub(crate) fn solve_sparse<'f>(
+        &'f self,
+        rows: &SparseRows<'f>,
+        least: &dyn Fn(usize) -> f64,
+        stop: &AtomicBool,
+    ) -> SparseRows<'f> {
+        let least: Vec<f64> = self.tree.order.iter().map(|&unknown| least(unknown as usize)).collect();
+        sparse::solve((&self.tree, &self.panels, self.arch), rows, &least, stop)
+    }
+
+    /// The fronts.
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
     }
 
     /// Number of stored entries of the factor.
@@ -125,7 +141,7 @@ pub(crate) mod tests {
             let mut solver = Multifrontal::factor(&matrix, &positions, &crate::NEVER).unwrap().unwrap();
             solver.arch = arch;
             solver.panels = factor(&solver.tree, &Graph::new(&matrix), arch, &crate::NEVER).unwrap();
-            let x = solver.solve(&rhs, None);
+            let x = solver.solve(&rhs);
             let rows = (0..1500).flat_map(|i| x.row(i).zip(wanted.row(i)));
             let worst = rows.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
             assert!(worst < 1e-9, "{arch:?}: {worst:e}");

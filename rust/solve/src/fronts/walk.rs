@@ -14,10 +14,10 @@ pub(crate) trait Visit: Sync {
     type Error: Send;
 
     /// Length of the front's own stretch of the store.
-    fn store_len(&self, front: &Front) -> usize;
+    fn store_len(&self, index: usize) -> usize;
 
     /// Length of the stores of a whole subtree.
-    fn subtree_store_len(&self, front: &Front) -> usize;
+    fn subtree_store_len(&self, index: usize) -> usize;
 
     /// Length of what the front passes on to its parent.
     fn passed_len(&self, index: usize) -> usize;
@@ -98,13 +98,13 @@ pub(crate) fn walk<V: Visit>(
     other: &mut [f64],
 ) -> Result<(), V::Error> {
     let front = &tree.fronts[root];
-    let (below, store) = store.split_at_mut(store.len() - visitor.store_len(front));
+    let (below, store) = store.split_at_mut(store.len() - visitor.store_len(root));
     if plan.forks(front) {
         walk_apart(tree, plan, visitor, &front.children, below, other, own)?;
     } else {
         let mut below = below;
         for &child in &front.children {
-            let (child_store, rest) = below.split_at_mut(visitor.subtree_store_len(&tree.fronts[child]));
+            let (child_store, rest) = below.split_at_mut(visitor.subtree_store_len(child));
             walk(tree, plan, visitor, child, child_store, &mut other[plan.offset[child]..], own)?;
             below = rest;
         }
@@ -129,8 +129,7 @@ fn walk_apart<V: Visit>(
         _ => {
             let (left, right) = roots.split_at(roots.len() / 2);
             let sum = |of: &dyn Fn(usize) -> usize| left.iter().map(|&root| of(root)).sum::<usize>();
-            let (store_left, store_right) =
-                store.split_at_mut(sum(&|root| visitor.subtree_store_len(&tree.fronts[root])));
+            let (store_left, store_right) = store.split_at_mut(sum(&|root| visitor.subtree_store_len(root)));
             let (own_left, own_right) = own.split_at_mut(sum(&|root| plan.own[root]));
             let (other_left, other_right) = other.split_at_mut(sum(&|root| plan.other[root]));
             let (left, right) = rayon::join(

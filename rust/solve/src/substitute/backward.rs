@@ -1,5 +1,4 @@
-//! Backward substitution, from the root to the leaves. It is dense, unless the caller says what is negligible: then subtrees
-//! whose right-hand sides are zero and around which the solution has died away are left out.
+//! Backward substitution, from the root to the leaves; dense (see `sparse` for the other).
 
 use pulp::Arch;
 
@@ -15,24 +14,8 @@ const FORK_COLUMNS: usize = 1000;
 /// Row blocks read side by side, a block column at a time: as many as the hardware prefetches.
 const STREAMS: usize = 4;
 
-/// What backward substitution may leave out.
-#[derive(Clone, Copy)]
-pub(crate) struct Negligible<'a> {
-    /// Whether a front's subtree has a right-hand side that is not zero, (fronts).
-    pub(crate) has_data: &'a [bool],
-    /// Magnitude up to which the solution around a subtree without data counts as zero.
-    pub(crate) magnitude: f64,
-}
-
 /// Solves for `x` (n, width) in place, in elimination order.
-pub(crate) fn backward(
-    tree: &Tree,
-    panels: &[f64],
-    arch: Arch,
-    width: usize,
-    negligible: Option<Negligible<'_>>,
-    x: &mut [f64],
-) {
+pub(crate) fn backward(tree: &Tree, panels: &[f64], arch: Arch, width: usize, x: &mut [f64]) {
     let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
     let mut space = vec![0; tree.fronts.len()];
     for (index, front) in tree.fronts.iter().enumerate() {
@@ -42,7 +25,13 @@ pub(crate) fn backward(
     let root = tree.root();
     let mut work = Buffer::zeroed(space[root]);
     let panels = &panels[..tree.fronts[root].subtree_panels];
-    BackwardPass { tree, arch, width, space, fork, negligible }.descend(root, panels, x, &[], &mut work);
+    BackwardPass { tree, arithmetic: Arithmetic { arch, width }, width, space, fork }.descend(
+        root,
+        panels,
+        x,
+        &[],
+        &mut work,
+    );
 }
 
 fn forks(front: &Front, columns: usize) -> bool {
@@ -56,29 +45,21 @@ fn boundary_len(front: &Front, width: usize) -> usize {
 
 struct BackwardPass<'a> {
     tree: &'a Tree,
-    arch: Arch,
+    arithmetic: Arithmetic,
     width: usize,
     /// Work space for the children of each front.
     space: Vec<usize>,
     /// Columns of a subtree from which on it is divided between threads.
     fork: usize,
-    negligible: Option<Negligible<'a>>,
 }
 
 impl BackwardPass<'_> {
-    /// Whether the solution in the subtree of `root` is zero, as far as the caller cares.
-    fn is_negligible(&self, root: usize, boundary: &[f64]) -> bool {
-        self.negligible.is_some_and(|negligible| {
-            !negligible.has_data[root] && boundary.iter().all(|x| x.abs() <= negligible.magnitude)
-        })
-    }
-
     /// Solves the subtree of `root` given the solution in the root's rows.
     fn descend(&self, root: usize, panels: &[f64], x: &mut [f64], boundary: &[f64], work: &mut [f64]) {
         let front = &self.tree.fronts[root];
         let (below, own) = x.split_at_mut(x.len() - front.columns * self.width);
         let (panels, panel) = panels.split_at(panels.len() - front.panel_len());
-        self.solve_front(front, panel, own, boundary);
+        self.arithmetic.solve_front(front, panel, own, boundary);
         self.descend_children(&front.children, panels, below, &Solved { front, own, boundary }, work);
     }
 
@@ -90,9 +71,7 @@ impl BackwardPass<'_> {
                 let front = &self.tree.fronts[root];
                 let (boundary, work) = work.split_at_mut(boundary_len(front, self.width));
                 parent.gather(front, self.width, boundary);
-                if !self.is_negligible(root, boundary) {
-                    self.descend(root, panels, x, boundary, work);
-                }
+                self.descend(root, panels, x, boundary, work);
             }
             _ => {
                 let (left, right) = roots.split_at(roots.len() / 2);
@@ -114,9 +93,17 @@ impl BackwardPass<'_> {
             }
         }
     }
+}
 
+/// What is done to each front, `width` columns wide.
+pub(crate) struct Arithmetic {
+    pub(crate) arch: Arch,
+    pub(crate) width: usize,
+}
+
+impl Arithmetic {
     /// Solves for `own` (columns, width) given the solution in the rows under them.
-    fn solve_front(&self, front: &Front, panel: &[f64], own: &mut [f64], boundary: &[f64]) {
+    pub(crate) fn solve_front(&self, front: &Front, panel: &[f64], own: &mut [f64], boundary: &[f64]) {
         let blocks = row_blocks(panel, front);
         let (triangle, lower) = blocks.split_at(front.columns.div_ceil(BLOCK));
         self.subtract_later(lower, boundary, 0, own);

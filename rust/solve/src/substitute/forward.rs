@@ -1,7 +1,7 @@
 //! Forward substitution, from the leaves to the root.
 //!
 //! It carries only the columns that are not zero so far in a front's subtree: right-hand sides of inpainting live in a thin
-//! band of unknowns, so most subtrees see few of them.
+//! band of unknowns, and those of short-ranged smoothing are mostly zero, so most subtrees see few of them.
 
 use pulp::Arch;
 
@@ -10,80 +10,152 @@ use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
 use crate::kernels::{Apply, Forward};
-use crate::substitute::substitution::{Columns, FORK, PIVOT_BLOCKS, row_blocks};
+use crate::substitute::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
+
+/// Right-hand sides by front.
+pub(crate) trait Given: Sync {
+    /// Which columns are not zero in the front's own unknowns, a bit each.
+    fn mask(&self, front: usize) -> u64;
+
+    /// Puts the rows of the front's own unknowns into `y` (columns of the front, width), which is zero.
+    fn put(&self, front: usize, active: Active, y: &mut [f64]);
+}
 
 /// The columns that are not zero in a subtree, in the order in which its fronts store them.
 #[derive(Clone, Copy)]
-struct Active {
-    mask: u64,
+pub(crate) struct Active {
+    pub(crate) mask: u64,
     /// Number of columns stored, padding included.
-    width: usize,
+    pub(crate) width: usize,
+    /// Columns stored in their places, whether they are zero or not; 0 if it is those of the mask, without gaps.
+    in_places: usize,
 }
 
 impl Active {
-    /// All columns are stored, in their places.
-    fn is_full(&self, columns: &Columns) -> bool {
-        self.width == columns.width
+    /// Those of `mask`, without gaps.
+    pub(crate) fn of(mask: u64) -> Self {
+        Self { mask, width: (mask.count_ones() as usize).next_multiple_of(BLOCK), in_places: 0 }
     }
 
-    /// The columns stored.
-    fn columns(&self, columns: &Columns) -> Vec<usize> {
-        if self.is_full(columns) {
-            return (0..columns.count).collect();
-        }
-        (0..columns.count).filter(|column| self.mask >> column & 1 == 1).collect()
+    /// The columns stored, ascending.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut left = match self.in_places {
+            0 => self.mask,
+            count => u64::MAX >> (MOST_COLUMNS - count),
+        };
+        std::iter::from_fn(move || {
+            let column = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (column < MOST_COLUMNS).then_some(column)
+        })
     }
 
     /// Where `column` is stored.
-    fn slot(&self, columns: &Columns, column: usize) -> usize {
-        if self.is_full(columns) { column } else { (self.mask & ((1 << column) - 1)).count_ones() as usize }
+    pub(crate) fn slot(&self, column: usize) -> usize {
+        if self.in_places > 0 { column } else { (self.mask & ((1 << column) - 1)).count_ones() as usize }
+    }
+
+    /// Where the columns of `other`, which are among these, are stored.
+    pub(crate) fn slots(&self, other: &Self) -> Slots {
+        Slots::of(other.columns().map(|column| self.slot(column)))
     }
 }
 
-/// Fills `x` (n, width), all zero, in elimination order. Returns whether each front's subtree has anything but zeros, (fronts).
-pub(crate) fn forward(tree: &Tree, panels: &[f64], arch: Arch, columns: Columns, x: &mut [f64]) -> Vec<bool> {
-    let nonzero = columns.nonzero();
-    let mut active: Vec<Active> = Vec::with_capacity(tree.fronts.len());
+/// Columns that one pass can have: a bit each in a word.
+pub const MOST_COLUMNS: usize = u64::BITS as usize;
+
+/// A short list of columns or of their slots: there is one for nearly every front and pass.
+pub(crate) struct Slots {
+    slots: [usize; MOST_COLUMNS],
+    count: usize,
+}
+
+impl Slots {
+    pub(crate) fn of(list: impl Iterator<Item = usize>) -> Self {
+        let mut slots = Self { slots: [0; MOST_COLUMNS], count: 0 };
+        for slot in list {
+            slots.slots[slots.count] = slot;
+            slots.count += 1;
+        }
+        slots
+    }
+}
+
+impl std::ops::Deref for Slots {
+    type Target = [usize];
+
+    fn deref(&self) -> &[usize] {
+        &self.slots[..self.count]
+    }
+}
+
+/// The columns that are not zero so far in each front's subtree, (fronts). Where those are nearly all of a `full` set of
+/// columns (their number and width), all are stored.
+pub(crate) fn activity(tree: &Tree, given: &impl Given, full: Option<(usize, usize)>) -> Vec<Active> {
+    let mut all: Vec<Active> = Vec::with_capacity(tree.fronts.len());
+    for (index, front) in tree.fronts.iter().enumerate() {
+        let mask = front.children.iter().fold(given.mask(index), |mask, &child| mask | all[child].mask);
+        let mut active = Active::of(mask);
+        if let Some((count, _)) = full.filter(|&(_, width)| width == active.width) {
+            active.in_places = count;
+        }
+        all.push(active);
+    }
+    all
+}
+
+/// Fills `x`, all zero, in elimination order: (n, `full_width`), or the `active` columns of each front, one after the other.
+pub(crate) fn forward(
+    tree: &Tree,
+    panels: &[f64],
+    arch: Arch,
+    given: &impl Given,
+    active: &[Active],
+    full_width: Option<usize>,
+    x: &mut [f64],
+) {
     let mut panel_starts = Vec::with_capacity(tree.fronts.len());
+    let mut subtree_store: Vec<usize> = Vec::with_capacity(tree.fronts.len());
     let mut start = 0;
-    for front in &tree.fronts {
-        let own = tree.order[front.start..front.start + front.columns].iter().map(|&i| nonzero[i as usize]);
-        let mask = own.chain(front.children.iter().map(|&child| active[child].mask)).fold(0, |all, mask| all | mask);
-        active.push(Active { mask, width: (mask.count_ones() as usize).next_multiple_of(BLOCK) });
+    for (front, active) in tree.fronts.iter().zip(active) {
         panel_starts.push(start);
         start += front.panel_len();
+        let below = front.children.iter().map(|&child| subtree_store[child]).sum::<usize>();
+        subtree_store.push(below + front.columns * full_width.unwrap_or(active.width));
     }
     let plan = Plan::new(tree, |index| passed_len(&tree.fronts[index], &active[index]));
     let root = tree.root();
     let (own, other) = plan.stacks(root);
     let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
-    let pass = ForwardPass { tree, panels, panel_starts, arch, columns, active };
+    let pass = ForwardPass { tree, panels, panel_starts, arch, given, active, full_width, subtree_store };
     let Ok(()) = walk(tree, &plan, &pass, root, x, &mut own, &mut other);
-    pass.active.iter().map(|active| active.mask != 0).collect()
 }
 
 fn passed_len(front: &Front, active: &Active) -> usize {
     front.rows.len().next_multiple_of(BLOCK) * active.width
 }
 
-struct ForwardPass<'a> {
+struct ForwardPass<'a, G> {
     tree: &'a Tree,
     panels: &'a [f64],
     panel_starts: Vec<usize>,
     arch: Arch,
-    columns: Columns<'a>,
-    active: Vec<Active>,
+    given: &'a G,
+    active: &'a [Active],
+    full_width: Option<usize>,
+    /// Length of the store of each front's subtree, (fronts).
+    subtree_store: Vec<usize>,
 }
 
-impl Visit for ForwardPass<'_> {
+impl<G: Given> Visit for ForwardPass<'_, G> {
     type Error = std::convert::Infallible;
 
-    fn store_len(&self, front: &Front) -> usize {
-        front.columns * self.columns.width
+    fn store_len(&self, index: usize) -> usize {
+        self.tree.fronts[index].columns * self.full_width.unwrap_or(self.active[index].width)
     }
 
-    fn subtree_store_len(&self, front: &Front) -> usize {
-        front.subtree_columns * self.columns.width
+    fn subtree_store_len(&self, index: usize) -> usize {
+        self.subtree_store[index]
     }
 
     fn passed_len(&self, index: usize) -> usize {
@@ -95,35 +167,26 @@ impl Visit for ForwardPass<'_> {
         if active.mask == 0 {
             return Ok(());
         }
-        let kept = active.columns(&self.columns);
-        if active.is_full(&self.columns) {
-            self.gather(front, &kept, active.width, x);
-            self.front(index, x, passed, &received);
-        } else {
-            let mut y = vec![0.0; front.columns * active.width];
-            self.gather(front, &kept, active.width, &mut y);
-            self.front(index, &mut y, passed, &received);
-            for (x, y) in x.chunks_exact_mut(self.columns.width).zip(y.chunks_exact(active.width)) {
-                kept.iter().zip(y).for_each(|(&column, &value)| x[column] = value);
+        match self.full_width {
+            Some(width) if width != active.width => {
+                let mut y = vec![0.0; front.columns * active.width];
+                self.given.put(index, active, &mut y);
+                self.front(index, &mut y, passed, &received);
+                let kept = Slots::of(active.columns());
+                for (x, y) in x.chunks_exact_mut(width).zip(y.chunks_exact(active.width)) {
+                    kept.iter().zip(y).for_each(|(&column, &value)| x[column] = value);
+                }
+            }
+            _ => {
+                self.given.put(index, active, x);
+                self.front(index, x, passed, &received);
             }
         }
         Ok(())
     }
 }
 
-impl ForwardPass<'_> {
-    /// Puts the right-hand side into `y` (columns of the front, width), which is zero.
-    fn gather(&self, front: &Front, kept: &[usize], width: usize, y: &mut [f64]) {
-        let unknowns = &self.tree.order[front.start..front.start + front.columns];
-        for (y, &unknown) in y.chunks_exact_mut(width).zip(unknowns) {
-            match self.columns.row(unknown as usize) {
-                None => {}
-                Some(row) if kept.len() == row.len() => y[..row.len()].copy_from_slice(row),
-                Some(row) => kept.iter().zip(y).for_each(|(&column, y)| *y = row[column]),
-            }
-        }
-    }
-
+impl<G: Given> ForwardPass<'_, G> {
     fn front(&self, index: usize, y: &mut [f64], passed: &mut [f64], received: &Received) {
         let (front, width) = (&self.tree.fronts[index], self.active[index].width);
         self.receive(index, received, |place| (place < front.columns).then_some(place), y);
@@ -154,13 +217,12 @@ impl ForwardPass<'_> {
             if passing.mask == 0 {
                 continue;
             }
-            let slots: Vec<usize> =
-                passing.columns(&self.columns).iter().map(|&column| active.slot(&self.columns, column)).collect();
+            let slots = active.slots(passing);
             let values = received.from(child, passed_len(below, passing));
             for (values, &place) in values.chunks_exact(passing.width).zip(&below.in_parent) {
                 let Some(row) = row(place as usize) else { continue };
                 let target = &mut target[row * active.width..][..active.width];
-                if passing.mask == active.mask || passing.is_full(&self.columns) {
+                if passing.mask == active.mask || passing.in_places > 0 {
                     target.iter_mut().zip(values).for_each(|(target, value)| *target += value);
                 } else {
                     slots.iter().zip(values).for_each(|(&slot, value)| target[slot] += value);

@@ -3,4 +3,5 @@
 pub(crate) mod backward;
 pub(crate) mod forward;
 pub(crate) mod solution;
+pub(crate) mod sparse;
 pub(crate) mod substitution;

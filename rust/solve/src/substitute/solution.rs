@@ -66,12 +66,6 @@ impl Solution<'_> {
         self.parts.iter().flat_map(move |part| &part.values[place * part.width..][..part.count]).copied()
     }
 
-    /// The solutions for one unknown of the first columns, 64 or all there are.
-    pub fn leading(&self, unknown: usize) -> &[f64] {
-        let place = self.place.map_or(unknown, |place| place[unknown] as usize);
-        self.parts.first().map_or(&[], |part| &part.values[place * part.width..][..part.count])
-    }
-
     /// The sum of all columns times their `factors`, for one unknown.
     pub(crate) fn combined(&self, unknown: usize, factors: &[f64]) -> f64 {
         let place = self.place.map_or(unknown, |place| place[unknown] as usize);

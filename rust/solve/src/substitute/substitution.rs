@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use crate::fronts::blocks::{BLOCK, panel_len};
-use crate::fronts::tree::Front;
+use crate::fronts::tree::{Front, Tree};
+use crate::substitute::forward::{Active, Given, Slots};
 use crate::substitute::solution::RightHandSides;
 
 /// Work of a front (multiplications) worth a second thread.
@@ -17,8 +18,6 @@ pub(crate) struct Columns<'a> {
     pub(crate) rhs: &'a RightHandSides,
     pub(crate) first: usize,
     pub(crate) count: usize,
-    /// `count` padded to whole vectors.
-    pub(crate) width: usize,
 }
 
 impl<'a> Columns<'a> {
@@ -27,11 +26,43 @@ impl<'a> Columns<'a> {
         self.rhs.row(unknown).map(|row| &row[self.first..][..self.count])
     }
 
-    /// Which of the columns are not zero, per unknown.
-    pub(crate) fn nonzero(&self) -> Vec<u64> {
+    /// The same by front.
+    pub(crate) fn by_front(self, tree: &'a Tree) -> ColumnsByFront<'a> {
         let bits = |row: &[f64]| row.iter().rev().fold(0, |bits: u64, &value| bits << 1 | u64::from(value != 0.0));
         let unknowns = (0..self.rhs.size()).into_par_iter().with_min_len(1024);
-        unknowns.map(|unknown| self.row(unknown).map_or(0, bits)).collect()
+        let nonzero = unknowns.map(|unknown| self.row(unknown).map_or(0, bits)).collect();
+        ColumnsByFront { columns: self, tree, nonzero }
+    }
+}
+
+/// Columns with a bit for each that is not zero, per unknown.
+pub(crate) struct ColumnsByFront<'a> {
+    columns: Columns<'a>,
+    tree: &'a Tree,
+    nonzero: Vec<u64>,
+}
+
+impl ColumnsByFront<'_> {
+    fn unknowns(&self, front: usize) -> &[u32] {
+        let front = &self.tree.fronts[front];
+        &self.tree.order[front.start..front.start + front.columns]
+    }
+}
+
+impl Given for ColumnsByFront<'_> {
+    fn mask(&self, front: usize) -> u64 {
+        self.unknowns(front).iter().fold(0, |mask, &unknown| mask | self.nonzero[unknown as usize])
+    }
+
+    fn put(&self, front: usize, active: Active, y: &mut [f64]) {
+        let kept = Slots::of(active.columns());
+        for (y, &unknown) in y.chunks_exact_mut(active.width).zip(self.unknowns(front)) {
+            match self.columns.row(unknown as usize) {
+                None => {}
+                Some(row) if kept.len() == row.len() => y[..row.len()].copy_from_slice(row),
+                Some(row) => kept.iter().zip(y).for_each(|(&column, y)| *y = row[column]),
+            }
+        }
     }
 }
 

@@ -5,10 +5,14 @@
 //! and the row is copied; a hand's breadth away it says only what the wider surroundings should be on average. A crease or a hem
 //! is not a tilt: of the directions of the vertex and of the triangles around it, the one that agrees best with the source's
 //! counts.
+//!
+//! The inside of a lining, or of a shell with a thickness, looks to the other limb. Vertices leave a face that looks the other
+//! way only if those around their patch agree with theirs (see [`upright`]); in a lining both directions will do.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::upright::{self, Side};
 use super::{Candidates, MaskValue, Matches, TargetSurface, Terms};
 use crate::adjacency::{NONE, VertexTriangles};
 use crate::fill::{Constraint, screened};
@@ -32,6 +36,8 @@ const GAP: f64 = 0.93;
 const TILT: f64 = 2.8;
 /// Cosines below this count as this.
 const LEAST_COSINE: f64 = 0.05;
+/// Normals agree, or are opposite, from this cosine on.
+const CLEARLY: f64 = 0.5;
 /// A vertex is held at its row if it is trusted over less than this share of its shortest edge: smoothing over so little
 /// changes nothing that the mesh can show.
 const HELD: f64 = 0.25;
@@ -70,37 +76,95 @@ struct Choice {
 
 /// The closest point of each vertex, and what it takes its row from instead.
 pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, Trust) {
-    let size = source.size();
     let closest = source.index().closest_points(target.positions);
-    let cosine = |i: usize, point: &SurfacePoint| {
-        let cosine = cosine(source, point, target.normals[i]);
-        if target.two_sided[i] { cosine.map(f64::abs) } else { cosine }
-    };
-    let cost = |i: usize, point: &SurfacePoint| cost(point.distance, cosine(i, point), size);
-    let bound = |(i, point): (usize, &SurfacePoint)| {
-        let own = cost(i, point);
-        let near = point.distance + EQUALLY_NEAR * size;
-        let cost = if may_move(own, point.distance, size) { SLACK * HYSTERESIS * own } else { 0.0 };
-        Bound { near: near * near, cost }
-    };
-    let bounds: Vec<Bound> = closest.par_iter().with_min_len(1024).enumerate().map(bound).collect();
     let around = VertexTriangles::new(target.triangles, target.positions.len());
-    let finish = |i: usize, found: &[Priced]| {
-        let mut choice = choose(source, found, closest[i].distance, size);
-        let sides: Vec<Vec3> = around.around(i).iter().filter_map(|&t| side(&target, t)).collect();
-        let agreement = |(point, share): &(SurfacePoint, f64)| {
-            let directions = std::iter::once(&target.normals[i]).chain(&sides);
-            let cosines = directions.filter_map(|&normal| self::cosine(source, point, normal));
-            share * cosines.map(f64::abs).reduce(f64::max).unwrap_or(1.0)
-        };
-        choice.cosine = choice.points.iter().map(agreement).sum();
-        choice
-    };
-    let choices = source.index().cheapest_points(target.positions, &bounds, SLACK, cost, finish);
+    let sides = target.triangles.par_iter().with_min_len(1024).map(|t| side(&target, t)).collect();
+    let search = Search { source, target, closest: &closest, around: &around, sides, size: source.size() };
+    let all: Vec<u32> = (0..closest.len() as u32).collect();
+    let mut choices = search.choices(&all, false);
+    let lining = search.lining(&choices);
+    for (&i, choice) in std::iter::zip(&lining, search.choices(&lining, true)) {
+        choices[i as usize] = choice;
+    }
     let gap: Vec<f64> = choices.iter().map(|choice| choice.gap).collect();
     let cosine = choices.iter().map(|choice| choice.cosine).collect();
     let all: Vec<_> = choices.into_iter().map(|choice| choice.points).collect();
     (Candidates::several(closest, &all), Trust { gap, cosine })
+}
+
+/// What choices are made from; `closest` (V) are the points nearest in position alone, `sides` (T) the triangles' normals.
+struct Search<'a> {
+    source: &'a Source,
+    target: TargetSurface<'a>,
+    closest: &'a [SurfacePoint],
+    around: &'a VertexTriangles,
+    sides: Vec<Option<Vec3>>,
+    size: f64,
+}
+
+impl Search<'_> {
+    /// The points of these vertices; with `both_ways` either direction of their normals will do.
+    fn choices(&self, vertices: &[u32], both_ways: bool) -> Vec<Choice> {
+        let (source, target, size) = (self.source, &self.target, self.size);
+        let at = |k: usize| vertices[k] as usize;
+        let cost = |k: usize, point: &SurfacePoint| {
+            let cosine = cosine(source, point, target.normals[at(k)]);
+            let either = both_ways || target.two_sided[at(k)];
+            cost(point.distance, if either { cosine.map(f64::abs) } else { cosine }, size)
+        };
+        let bound = |(k, &i): (usize, &u32)| {
+            let point = &self.closest[i as usize];
+            let own = cost(k, point);
+            let near = point.distance + EQUALLY_NEAR * size;
+            let cost = if may_move(own, point.distance, size) { SLACK * HYSTERESIS * own } else { 0.0 };
+            Bound { near: near * near, cost }
+        };
+        let bounds: Vec<Bound> = vertices.par_iter().with_min_len(1024).enumerate().map(bound).collect();
+        let queries: Vec<[f32; 3]> = vertices.iter().map(|&i| target.positions[i as usize]).collect();
+        let finish = |k: usize, found: &[Priced]| {
+            let i = at(k);
+            let mut choice = choose(source, found, self.closest[i].distance, size);
+            let agreement = |(point, share): &(SurfacePoint, f64)| {
+                let there = blend(source, point);
+                let sides = self.around.around(i).iter().filter_map(|&t| self.sides[t as usize]);
+                let cosines =
+                    std::iter::once(target.normals[i]).chain(sides).filter_map(|normal| between(there, normal));
+                share * cosines.map(f64::abs).reduce(f64::max).unwrap_or(1.0)
+            };
+            choice.cosine = choice.points.iter().map(agreement).sum();
+            choice
+        };
+        source.index().cheapest_points(&queries, &bounds, SLACK, cost, finish)
+    }
+
+    /// The vertices, ascending, that have left a face which looks the other way, but lie in a patch among others that stay on
+    /// such faces.
+    fn lining(&self, choices: &[Choice]) -> Vec<u32> {
+        let has_left = |&i: &u32| {
+            let (closest, choice) = (&self.closest[i as usize], &choices[i as usize]);
+            choice.gap > closest.distance + 2.0 * EQUALLY_NEAR * self.size
+                && !self.target.two_sided[i as usize]
+                && self.cosine_of(i as usize, closest) < 0.0
+        };
+        let n = choices.len() as u32;
+        let open: Vec<u32> = (0..n).into_par_iter().with_min_len(1024).filter(has_left).collect();
+        if open.is_empty() {
+            return open;
+        }
+        let side = |i: usize| match self.cosine_of(i, &self.closest[i]) {
+            cosine if cosine >= CLEARLY => Side::Upright,
+            cosine if cosine <= -CLEARLY => Side::Flipped,
+            _ => Side::Neither,
+        };
+        let sides: Vec<Side> = (0..choices.len()).into_par_iter().with_min_len(1024).map(side).collect();
+        let is_upright = upright::patches_among_upright(self.target, &open, sides);
+        std::iter::zip(open, is_upright).filter_map(|(i, is_upright)| (!is_upright).then_some(i)).collect()
+    }
+
+    /// Cosine between the normals of vertex `i` and of a point, 0 where there is none.
+    fn cosine_of(&self, i: usize, point: &SurfacePoint) -> f64 {
+        cosine(self.source, point, self.target.normals[i]).unwrap_or(0.0)
+    }
 }
 
 /// Cost of a point at a distance whose normal has a cosine with the vertex's; without a normal only distance counts.
@@ -111,10 +175,18 @@ fn cost(distance: f64, cosine: Option<f64>, size: f64) -> f64 {
 
 /// Cosine between a vertex's normal and the source's normal at `point`, None where either has no length.
 fn cosine(source: &Source, point: &SurfacePoint, normal: Vec3) -> Option<f64> {
+    between(blend(source, point), normal)
+}
+
+/// The source's normal at `point`, of any length.
+fn blend(source: &Source, point: &SurfacePoint) -> DVec3 {
     let corners = source.triangles()[point.triangle as usize];
-    let blend: DVec3 = std::iter::zip(corners, point.barycentric)
-        .map(|(i, share)| source.normals()[i as usize].as_dvec3() * share)
-        .sum();
+    let normals = corners.map(|i| source.normals()[i as usize].as_dvec3());
+    std::iter::zip(normals, point.barycentric).map(|(normal, share)| normal * share).sum()
+}
+
+/// Cosine between two directions, None where either has no length.
+fn between(blend: DVec3, normal: Vec3) -> Option<f64> {
     let normal = normal.as_dvec3();
     let lengths = blend.length() * normal.length();
     (lengths > 0.0).then(|| (blend.dot(normal) / lengths).clamp(-1.0, 1.0))
@@ -127,13 +199,16 @@ fn may_move(cost: f64, distance: f64, size: f64) -> bool {
 }
 
 /// Unit normal of a triangle of the target, unless it has none.
-fn side(target: &TargetSurface<'_>, t: u32) -> Option<Vec3> {
-    let [a, b, c] = target.triangles[t as usize].map(|i| Vec3::from(target.positions[i as usize]).as_dvec3());
+fn side(target: &TargetSurface<'_>, triangle: &[u32; 3]) -> Option<Vec3> {
+    let [a, b, c] = triangle.map(|i| Vec3::from(target.positions[i as usize]).as_dvec3());
     (b - a).cross(c - a).try_normalize().map(DVec3::as_vec3)
 }
 
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
 fn choose(source: &Source, found: &[Priced], distance: f64, size: f64) -> Choice {
+    if let [only] = found {
+        return Choice { points: vec![(only.point, 1.0)], gap: only.point.distance, cosine: 1.0 };
+    }
     let near = (distance + EQUALLY_NEAR * size).powi(2);
     let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
     let least = |among: &dyn Fn(&Priced) -> bool| {

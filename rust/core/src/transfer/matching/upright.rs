@@ -45,7 +45,8 @@ pub(super) fn find(
         .with_min_len(1024)
         .map(|i| Side::of(closest[i].distance, angles[i], criteria))
         .collect();
-    let is_upright = patches_among_upright(target, &found, sides);
+    let open: Vec<u32> = found.iter().map(|&(i, _)| i).collect();
+    let is_upright = patches_among_upright(target, &open, sides);
     let mut is_upright = is_upright.into_iter();
     found.retain(|_| is_upright.next().expect("one each"));
     found
@@ -53,9 +54,12 @@ pub(super) fn find(
 
 /// How a vertex matches.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Side {
+pub(super) enum Side {
+    /// Too far away, or neither way clearly.
     Neither,
+    /// Its normal agrees with that of its point.
     Upright,
+    /// Its normal is opposite to that of its point.
     Flipped,
     /// One of those that an agreeing face was found for.
     Open,
@@ -71,9 +75,10 @@ impl Side {
     }
 }
 
-/// For each vertex `found`, whether more of the vertices around its patch match upright than flipped.
-fn patches_among_upright(target: TargetSurface<'_>, found: &[(u32, SurfacePoint)], mut sides: Vec<Side>) -> Vec<bool> {
-    found.iter().for_each(|&(i, _)| sides[i as usize] = Side::Open);
+/// For each of the vertices `open`, whether more of the vertices around its patch match upright than flipped; `sides` (V) are
+/// those of all.
+pub(super) fn patches_among_upright(target: TargetSurface<'_>, open: &[u32], mut sides: Vec<Side>) -> Vec<bool> {
+    open.iter().for_each(|&i| sides[i as usize] = Side::Open);
     let side = |i: u32| sides[i as usize];
     // Where limbs penetrate deeply, vertices that match neither way lie around the patch.
     let is_open = |i: u32| matches!(side(i), Side::Open | Side::Neither);
@@ -90,7 +95,7 @@ fn patches_among_upright(target: TargetSurface<'_>, found: &[(u32, SurfacePoint)
         votes[patches.find(open) as usize] += t.iter().map(|&i| i64::from(side(i) == Side::Upright)).sum::<i64>();
         votes[patches.find(open) as usize] -= t.iter().map(|&i| i64::from(side(i) == Side::Flipped)).sum::<i64>();
     }
-    found.iter().map(|&(i, _)| votes[patches.find(i) as usize] > 0).collect()
+    open.iter().map(|&i| votes[patches.find(i) as usize] > 0).collect()
 }
 
 /// The nearest point in front of which a vertex lies and whose normal agrees, where there is one within reach.
