@@ -23,10 +23,14 @@ def enable() -> object:
 
 
 def _lay_out(source: Path, folder: Path) -> None:
-    """A link where the system lets everyone make one, else a copy."""
+    """A link where the system lets everyone make one, else a copy; wine makes links that lead nowhere."""
     try:
         folder.symlink_to(source, target_is_directory=True)
     except (OSError, NotImplementedError):
+        shutil.copytree(source, folder)
+        return
+    if not (folder / "__init__.py").exists():
+        folder.unlink(missing_ok=True)
         shutil.copytree(source, folder)
 
 
