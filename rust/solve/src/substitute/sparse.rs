@@ -112,7 +112,8 @@ impl<'f> Layout<'f> {
     pub(crate) fn collect(self, append: impl Fn(usize, &mut Vec<(u32, f64)>) + Sync) -> SparseRows<'f> {
         let rows = |(entries, ends): &mut (Vec<(u32, f64)>, Vec<usize>), front: usize| {
             let places = self.places(front);
-            (entries.clear(), ends.clear());
+            entries.clear();
+            ends.clear();
             for place in places.clone() {
                 append(self.unknown(place), entries);
                 ends.push(entries.len());
