@@ -176,8 +176,6 @@ def panels(window: Window) -> Steps:
     yield from window.screenshot("overlay_bones")
     with window.context():
         bpy.ops.skinwright.show_overlay(kind="NONE")
-        bpy.ops.skinwright.check_weights()
-    yield from window.screenshot("check_weights")
 
 
 def options(window: Window) -> Steps:
