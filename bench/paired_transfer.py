@@ -1,4 +1,4 @@
-"""CPU seconds of a whole transfer in Blender, this checkout against another one, taking turns.
+"""CPU seconds of a whole transfer in Blender with the paper's method, this checkout against another one, taking turns.
 
     python bench/paired_transfer.py ../before --native out/develop --other-native ../before/out/develop
 
@@ -72,7 +72,8 @@ def _work(kind: str) -> None:
     addon.register()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     source, target = _body(bpy), _garment(bpy, *SIDES[kind], triangles=kind == "triangles")
-    params = addon.transfer.TransferParams()
+    settings = addon.transfer.TransferParams
+    params = settings(**{"method": "paper"} if hasattr(settings, "method") else {})  # both sides the same
     for _ in sys.stdin:
         start = time.process_time()
         addon.transfer.transfer_weights(bpy.context, source, [target], params)
