@@ -67,8 +67,8 @@ def _over_hidden(body: Body, garment: Garment, result: Result) -> str:
 
 def _on_other_parts(body: Body, garment: Garment, result: Result) -> str:
     """Vertices out of reach of the source that lie on another mesh on its armature: a part of the body, perhaps."""
-    free = np.flatnonzero(result.written & ~result.matched)
-    if len(free) < _A_PART * len(result.written):
+    free, others = np.flatnonzero(result.written & ~result.matched), _others(body, garment)
+    if not others or len(free) < _A_PART * len(result.written):
         return ""
     positions = garment.shape.geometry.positions
     points, share = _some(positions[free], _MOST_POINTS), len(free) / len(positions)
@@ -77,7 +77,7 @@ def _on_other_parts(body: Body, garment: Garment, result: Result) -> str:
     if share * points_far.mean() < _A_PART:
         return ""
     shares: dict[str, float] = {}
-    for other in _others(body, garment):
+    for other in others:
         try:
             surface = _some(mesh.read(other).positions, _MOST_OF_BODY)
         except SceneError:  # it has no surface that could be meant
