@@ -105,7 +105,7 @@ def replace_rows(rows: Rows, indices: NDArray[np.integer], new: Rows) -> Rows:
     return Rows(indptr.astype(np.uint32), bones[order], values[order])
 
 
-def differences(one: Rows, other: Rows) -> NDArray[np.float64]:
+def half_l1(one: Rows, other: Rows) -> NDArray[np.float64]:
     """(V,) half the sum of absolute differences of two rows each: the share of weights that is elsewhere."""
     vertex = np.concatenate([entry_vertices(one), entry_vertices(other)])
     bones, values = np.concatenate([one.bones, other.bones]), np.concatenate([one.values, -other.values])

@@ -56,6 +56,15 @@ def _keys(points: NDArray[np.float32], cell: float, shift: float | NDArray[np.fl
     return (np.floor((points.astype(np.float64) + shift) / cell).astype(np.int64) * _PRIMES).sum(axis=1, dtype=np.int64)
 
 
+def tree(points: NDArray[np.float32]) -> KDTree:
+    """For searches among points (n, 3), which keep their numbers."""
+    found = KDTree(len(points))
+    for number, point in enumerate(points.tolist()):
+        found.insert(point, number)
+    found.balance()
+    return found
+
+
 def nearest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> NDArray[np.float64]:
     """(n,) how far each query (n, 3) is from the closest of the points (m, 3)."""
     return closest(points, queries)[1]
@@ -63,9 +72,6 @@ def nearest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> NDArra
 
 def closest(points: NDArray[np.float32], queries: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """(n,) the closest of the points (m, 3) to each query (n, 3), and how far it is."""
-    tree = KDTree(len(points))
-    for number, point in enumerate(points.tolist()):
-        tree.insert(point, number)
-    tree.balance()
-    found = [tree.find(query)[1:] for query in queries.tolist()]
+    near = tree(points)
+    found = [near.find(query)[1:] for query in queries.tolist()]
     return np.array([index for index, _ in found], np.int64), np.array([distance for _, distance in found], np.float64)

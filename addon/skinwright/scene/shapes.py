@@ -42,27 +42,36 @@ def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Sh
     """Shape and weights in the groups `names`, of the vertices that all its modifiers leave; inside `looked_at`."""
     if look == "REST" or not _is_shaped(obj, look):
         return _plain(obj), vertex_groups.read(obj, names)
-    with _evaluable(obj) as shown, _without(_reweighting_after_the_pose(shown)):
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        evaluated = shown.evaluated_get(depsgraph)
-        seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
-        try:
-            geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
-            rows = vertex_groups.read_evaluated(evaluated, seen, names)
-        finally:
-            evaluated.to_mesh_clear()
+    with (
+        _evaluable(obj) as shown,
+        _without(_reweighting_after_the_pose(shown)),
+        _evaluated_mesh(shown) as (evaluated, seen),
+    ):
+        geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
+        rows = vertex_groups.read_evaluated(evaluated, seen, names)
         return Shape(geometry, np.array(shown.matrix_world), []), rows
 
 
-def masked(obj: bpy.types.Object, look: Look) -> tuple[str, NDArray[np.float32]] | None:
+@contextmanager
+def _evaluated_mesh(shown: bpy.types.Object) -> Iterator[tuple[bpy.types.Object, bpy.types.Mesh]]:
+    """The evaluated object, and its mesh with the groups that modifiers leave."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = shown.evaluated_get(depsgraph)
+    try:
+        yield evaluated, evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def masked(obj: bpy.types.Object, look: Look, left: NDArray[np.float32]) -> tuple[str, NDArray[np.float32]] | None:
     """The object and Mask modifiers that hide a part of its surface, and the points (n, 3) there; inside `looked_at`.
 
-    Parts that hang on nothing visible, as helper geometry does, are not meant.
+    `left` (m, 3) are those that `read_source` gave. Parts that hang on nothing visible, as helper geometry does, do not
+    count.
     """
     masks = [m for m in modifiers.shown(obj) if m.type == "MASK"]
     if look == "REST" or not masks:
         return None
-    left = read_source(obj, look, [])[0].geometry.positions
     with _without(masks):
         whole = read_source(obj, look, [])[0].geometry
     same = places.numbers(np.concatenate([whole.positions, left]))
@@ -93,14 +102,12 @@ def read_target(obj: bpy.types.Object, look: Look) -> Shape:
 def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: list[str]) -> Rows:
     """What this modifier alone leaves of the mesh's weights in the groups `names`."""
     place = list(obj.modifiers).index(modifier)
-    with _evaluable(obj) as shown, _without(m for i, m in enumerate(shown.modifiers) if i != place):
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        evaluated = shown.evaluated_get(depsgraph)
-        seen = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
-        try:
-            return vertex_groups.read_evaluated(evaluated, seen, names)
-        finally:
-            evaluated.to_mesh_clear()
+    with (
+        _evaluable(obj) as shown,
+        _without(m for i, m in enumerate(shown.modifiers) if i != place),
+        _evaluated_mesh(shown) as (evaluated, seen),
+    ):
+        return vertex_groups.read_evaluated(evaluated, seen, names)
 
 
 def _plain(obj: bpy.types.Object) -> Shape:

@@ -6,6 +6,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import csr
+from ..csr import Rows
 from ..scene import armature, weight_state
 from ..scene.weight_state import WeightState
 from .record import Record
@@ -47,17 +49,12 @@ def half_l1(a: WeightState, b: WeightState, bones: set[str] | None = None) -> ND
     """(V,) half of sum_j |a_j - b_j| over the groups that are `bones`, all groups if None."""
     names = sorted({*a.names, *b.names} if bones is None else bones & {*a.names, *b.names})
     column = {name: index for index, name in enumerate(names)}
-    entries = [_entries(state, column, sign) for state, sign in ((a, 1.0), (b, -1.0))]
-    vertex, bone, value = (np.concatenate(parts) for parts in zip(*entries, strict=True))
-    n = len(a.indptr) - 1
-    place, inverse = np.unique(vertex * max(len(names), 1) + bone, return_inverse=True)
-    total = np.abs(np.bincount(inverse.reshape(-1), value, len(place)))
-    return 0.5 * np.bincount(place // max(len(names), 1), total, n)
+    return csr.half_l1(_rows(a, column), _rows(b, column))
 
 
-def _entries(state: WeightState, column: dict[str, int], sign: float) -> tuple[NDArray, NDArray, NDArray]:
+def _rows(state: WeightState, column: dict[str, int]) -> Rows:
+    """The weights over the columns of these groups."""
     columns = np.array([column.get(name, -1) for name in state.names], np.int64)
-    bone = columns[state.groups.astype(np.int64)] if len(columns) else np.zeros(0, np.int64)
-    vertex = np.repeat(np.arange(len(state.indptr) - 1, dtype=np.int64), np.diff(state.indptr))
-    kept = bone >= 0
-    return vertex[kept], bone[kept], sign * state.values[kept].astype(np.float64)
+    bones = columns[state.groups.astype(np.int64)] if len(columns) else np.zeros(0, np.int64)
+    kept = csr.keep_entries(Rows(state.indptr, state.groups, state.values), bones >= 0)
+    return kept._replace(bones=bones[bones >= 0].astype(np.uint32))

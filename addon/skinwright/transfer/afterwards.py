@@ -14,6 +14,7 @@ from .inputs import Body, Garment
 # Points of a surface that are looked at: a few centimetres apart on a body.
 _MOST_POINTS = 2000
 _MOST_OF_BODY = 8000
+_MOST_OF_PART = 200
 # The share of a target that is worth a word.
 _MUCH = 0.05
 _A_PART = 0.15
@@ -104,48 +105,45 @@ def _hung_on_one_place(body: Body, garment: Garment, result: Result) -> str:
     """Long loose parts that lie along the source but match nowhere, as edges of ribbons, and so do not bend with it."""
     if result.islands is None or not body.bones:
         return ""
-    geometry, astray = garment.shape.geometry, 0
-    rows = csr.take_columns(result.rows, np.isin(result.names, body.bones))
-    names = [name for name in result.names if name in body.bones]
-    parts = result.islands if result.matched.any() else np.zeros_like(result.islands)
-    for part in np.unique(parts[~result.matched]).tolist():
-        vertices = np.flatnonzero(parts == part)
-        if result.matched[vertices].any() or not result.written[vertices].all():
-            continue
-        size = float(np.linalg.norm(np.ptp(geometry.positions[vertices], axis=0)))
-        if size > _LONG * float(np.linalg.norm(body.geometry.size)):
-            astray += _is_astray(body, geometry.positions, rows, names, _some(vertices, 200), _reach(result))
+    least = _LONG * float(np.linalg.norm(body.geometry.size))
+    parts = [_some(vertices, _MOST_OF_PART) for vertices in _unmatched_parts(garment, result, result.islands, least)]
+    astray = _astray(body, garment, result, parts) if parts else 0
     if not astray:
         return ""
-    what = (
-        f"{astray} loose parts of {garment.object.name} match"
-        if astray > 1
-        else (f"A loose part of {garment.object.name} matches")
-    )
+    name = garment.object.name
+    what = f"{astray} loose parts of {name} match" if astray > 1 else f"A loose part of {name} matches"
     return (
         f"{what} nowhere, although near {body.name} all along, and will not bend with it: set Loose Parts to Nearest "
         "if this is no stiff thing"
     )
 
 
-def _is_astray(
-    body: Body,
-    positions: NDArray[np.float32],
-    rows: csr.Rows,
-    names: list[str],
-    vertices: NDArray[np.int64],
-    reach: float,
-) -> bool:
-    """Whether vertices mostly within reach follow other bones than what is closest to them."""
-    closest, distance = places.closest(body.geometry.positions, positions[vertices])
-    if (distance <= reach).mean() < 0.5:
-        return False
+def _unmatched_parts(
+    garment: Garment, result: Result, islands: NDArray[np.uint32], least: float
+) -> list[NDArray[np.int64]]:
+    """The vertices of every loose part that is written, matches nowhere and is longer than `least`."""
+    parts = islands if result.matched.any() else np.zeros_like(islands)
+    order = np.argsort(parts, kind="stable")
+    starts = np.flatnonzero(np.diff(parts[order].astype(np.int64), prepend=-1))
+    positions, free = garment.shape.geometry.positions[order], (result.written & ~result.matched)[order]
+    sides = np.maximum.reduceat(positions, starts) - np.minimum.reduceat(positions, starts)
+    chosen = np.logical_and.reduceat(free, starts) & (np.linalg.norm(sides, axis=1) > least)
+    ends = np.append(starts[1:], len(order))
+    return [order[start:end] for start, end in zip(starts[chosen], ends[chosen], strict=True)]
+
+
+def _astray(body: Body, garment: Garment, result: Result, parts: list[NDArray[np.int64]]) -> int:
+    """How many parts lie mostly within reach and follow other bones than what is closest to them."""
+    vertices = np.concatenate(parts)
+    closest, distance = places.closest(body.geometry.positions, garment.shape.geometry.positions[vertices])
+    is_bone = np.isin(result.names, body.bones)
     number = {name: column for column, name in enumerate(body.bones)}
-    columns = np.array([number[name] for name in names], np.uint32)
-    mine = csr.take_rows(rows, vertices)
-    mine = mine._replace(bones=columns[mine.bones])
-    theirs = csr.take_rows(body.bone_weights, closest)
-    return bool(csr.differences(mine, theirs)[distance <= reach].mean() > _ASTRAY)
+    columns = np.array([number[name] for name in result.names if name in number], np.uint32)
+    mine = csr.take_rows(csr.take_columns(result.rows, is_bone), vertices)
+    elsewhere = csr.half_l1(mine._replace(bones=columns[mine.bones]), csr.take_rows(body.bone_weights, closest))
+    near, ends = distance <= _reach(result), np.cumsum([len(part) for part in parts], dtype=np.int64)[:-1]
+    split = zip(np.split(near, ends), np.split(elsewhere, ends), strict=True)
+    return sum(bool(within.mean() >= 0.5 and away[within].mean() > _ASTRAY) for within, away in split)
 
 
 def _reach(result: Result) -> float:

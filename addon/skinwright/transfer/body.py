@@ -79,7 +79,10 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
     fields = [name for name in chosen if name not in bones]
     with shapes.looked_at(objects, params.geometry):
         seen = [shapes.read_source(obj, params.geometry, bones + fields) for obj in objects]
-        hidden = [shapes.masked(obj, params.geometry) for obj in objects]
+        hidden = [
+            shapes.masked(obj, params.geometry, shape.geometry.positions)
+            for obj, (shape, _) in zip(objects, seen, strict=True)
+        ]
     geometry = parts.united([shape.geometry for shape, _ in seen])
     mesh.check_faces(source, geometry)
     rows = parts.united_rows([rows for _, rows in seen])

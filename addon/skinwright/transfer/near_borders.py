@@ -1,7 +1,6 @@
 """Seams of a target that are almost closed, as in files that round: they are not welded, and come apart in poses."""
 
 import numpy as np
-from mathutils.kdtree import KDTree
 from numpy.typing import NDArray
 
 from .. import csr
@@ -29,7 +28,7 @@ def warning(garment: Garment) -> str:
     if len(one) < _FEWEST:
         return ""
     rows = vertex_groups.read(garment.object, garment.names)
-    apart = csr.differences(csr.take_rows(rows, one), csr.take_rows(rows, other)) > _COMES_APART
+    apart = csr.half_l1(csr.take_rows(rows, one), csr.take_rows(rows, other)) > _COMES_APART
     if int(apart.sum()) < _FEWEST:
         return ""
     weld = 1.1 * float(gaps[apart].max()) / diagonal
@@ -45,11 +44,7 @@ def _pairs(
     """Border vertices (n,), others (n,) within `reach` but not at the same place, and the gaps (n,)."""
     number = places.numbers(positions[border])
     border = border[np.unique(number, return_index=True)[1]]
-    points = positions[border].tolist()
-    tree = KDTree(len(points))
-    for index, point in enumerate(points):
-        tree.insert(point, index)
-    tree.balance()
+    points, tree = positions[border].tolist(), places.tree(positions[border])
     asked = np.unique(np.linspace(0, len(points) - 1, min(len(points), _MOST_POINTS)).astype(np.int64)).tolist()
     found = [(i, *near[1:]) for i in asked for near in tree.find_n(points[i], 3) if near[1] != i and near[2] <= reach]
     found = [pair for pair in found if pair[2] > 0]
