@@ -13,21 +13,6 @@ from mathutils import Matrix  # noqa: E402
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-@pytest.fixture
-def body(scene):
-    return figure.body()
-
-
-@pytest.fixture
-def rig(body):
-    return body.modifiers[0].object
-
-
-@pytest.fixture
-def boot(body):
-    return builders.mesh("Boot", *figure.tube(0.12, 0.05, 0.45, 0.1))
-
-
 def stay(obj):
     """Leave the vertices where they were before a parent or constraint."""
     bpy.context.view_layer.update()

@@ -14,21 +14,6 @@ from mathutils import Matrix  # noqa: E402
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-@pytest.fixture
-def body(scene):
-    return figure.body()
-
-
-@pytest.fixture
-def rig(body):
-    return body.modifiers[0].object
-
-
-@pytest.fixture
-def boot(body):
-    return builders.mesh("Boot", *figure.tube(0.12, 0.05, 0.45, 0.1))
-
-
 def astray(obj, rig, before):
     """How far a pose takes it from where linear blending of its weights does."""
     weights = builders.dense(obj, figure.BONES)

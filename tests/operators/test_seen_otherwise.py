@@ -11,16 +11,6 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-@pytest.fixture
-def body(scene):
-    return figure.body()
-
-
-@pytest.fixture
-def rig(body):
-    return body.modifiers[0].object
-
-
 def hide(body, vertices):
     body.vertex_groups.new(name="hide").add([int(i) for i in vertices], 1, "REPLACE")
     modifier = body.modifiers.new("Hide", "MASK")
