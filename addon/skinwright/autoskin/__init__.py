@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import csr, jobs
 from ..reporting import AutoskinReport, SkinnedMesh
-from ..scene import armature, object_state, vertex_groups
+from ..scene import armature, editable, object_state, vertex_groups
 from ..scene.watched import Watched
 from .compute import Answer, compute
 from .inputs import Target, read
@@ -52,4 +52,4 @@ def _write(target: Target, answer: Answer, params: AutoskinParams) -> SkinnedMes
     if armature.find(obj) is None:
         armature.bind(obj, rig, make_parent=params.make_parent)
     columns = int(np.count_nonzero(target.chosen))
-    return SkinnedMesh(obj.name, rig.name, len(target.vertices), columns, answer.outside)
+    return SkinnedMesh(obj.name, rig.name, len(target.vertices), columns, answer.outside, editable.changes_others(obj))
