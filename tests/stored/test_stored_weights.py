@@ -327,6 +327,7 @@ class TestCommand:
         assert weights("list", "--object", "Body") == 0
         assert "Mine: 256 vertices" in capsys.readouterr().out
         assert weights("forget", tmp_path / "out.blend", "--object", "Body") == 0
+        assert "nothing was saved: name a file with --save" in capsys.readouterr().err
 
     def test_refusals(self, weights, body, tmp_path, capsys):
         (tmp_path / "mine.npz").write_bytes(b"mine")

@@ -55,6 +55,8 @@ def steps(
     first, last = frames
     if last < first:
         raise SceneError(f"the last frame, {last}, lies before the first, {first}")
+    if max(-first, last) > poses.LAST_FRAME:
+        raise SceneError(f"frames {first} to {last} are too far out: Blender shows none beyond {poses.LAST_FRAME}")
     mesh_cache.check(obj)
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)

@@ -35,7 +35,7 @@ def read(path: Path) -> Record:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise record.RecordError(f"it is not a text ({error})") from error
 

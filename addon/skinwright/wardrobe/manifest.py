@@ -62,7 +62,7 @@ def read(path: Path) -> list[Job]:
         garments = [{"file": str(file)} for file in _files(path / "garments")]
         return _jobs({"bodies": bodies, "garments": garments}, path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         problem = "it is nested too deeply" if isinstance(error, RecursionError) else error
         raise ManifestError(f"{path} cannot be read as a manifest: {problem}") from error
