@@ -109,15 +109,15 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class SkinnedMesh:
-    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it, `sharing` warns
-    of other objects that have the same weights now."""
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it, `notes` are
+    sentences on what else concerns the object."""
 
     target: str
     armature: str
     vertices: int
     bones: int
     outside: list[str]
-    sharing: str = ""
+    notes: list[str] = field(default_factory=list)
 
     def sentence(self) -> str:
         """The line the artist reads."""
@@ -125,7 +125,7 @@ class SkinnedMesh:
 
     def warnings(self) -> list[str]:
         """What is worth a look."""
-        found = [self.sharing] if self.sharing else []
+        found = list(self.notes)
         if self.outside:
             named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
             found.append(f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}")

@@ -350,6 +350,28 @@ class TestForeignFiles:
         assert (tmp_path / "limb.pc2").read_bytes() == content
 
 
+def test_objects_of_libraries_may_have_the_same_names(addon, tmp_path):
+    """The armature is the one that the modifier names, not the local one that is called so."""
+    tube()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    local, rig = tube()
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
+        here.objects = ["Limb", "Rig"]
+    linked = next(obj for obj in here.objects if obj.type == "MESH")
+    for obj in here.objects:
+        bpy.context.collection.objects.link(obj)
+    turn(rig, (1, 0, 0), 90)
+    character = part(addon, "refine.character")
+    assert np.allclose(character.pose(linked, character.read(linked)), np.eye(4))
+    assert not np.allclose(character.pose(local, character.read(local)), np.eye(4))
+    builders.select(linked)
+    assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
+    (copy,) = [obj for obj in bpy.data.objects if obj.get("skinwright_preview_of")]
+    assert np.abs(shown(copy) - shown(linked)).max() < 0.01
+    bpy.ops.skinwright.live_refine()
+
+
 def test_bones_of_the_command_line_are_those_of_the_armature(addon, tmp_path, capsys):
     tube()
     command = addon.headless.command_line.refine

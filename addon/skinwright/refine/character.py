@@ -59,9 +59,7 @@ class Character:
 
 def read(obj: bpy.types.Object) -> Character:
     """Everything about a mesh that no pose changes. Raises SceneError before anything is written."""
-    rig = armature.find(obj)
-    if rig is None:
-        raise SceneError(f"{obj.name} has no armature whose joints could be refined: give it an Armature modifier")
+    rig = rig_of(obj)
     deforming, members = armature.deform_bones(rig), {group.name for group in obj.vertex_groups}
     bones = [bone.name for bone in rig.data.bones if bone.name in deforming and bone.name in members]
     if not bones:
@@ -114,4 +112,12 @@ def preserves_volume(obj: bpy.types.Object) -> bool:
 
 def pose(obj: bpy.types.Object, character: Character) -> NDArray[np.float64]:
     """(B, 4, 4) the present pose."""
-    return armature.pose_from_rest(obj, bpy.data.objects[character.rig], character.bones)
+    return armature.pose_from_rest(obj, rig_of(obj), character.bones)
+
+
+def rig_of(obj: bpy.types.Object) -> bpy.types.Object:
+    """The armature that deforms the mesh: another object, of a library, may have its name. Raises SceneError."""
+    rig = armature.find(obj)
+    if rig is None:
+        raise SceneError(f"{obj.name} has no armature whose joints could be refined: give it an Armature modifier")
+    return rig
