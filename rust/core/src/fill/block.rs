@@ -116,8 +116,7 @@ impl<'b> SparseColumns<'b> {
     }
 
     fn minimum(&self) -> f64 {
-        let noticeable = self.solves.rows.values().filter(|value| value.abs() >= self.least);
-        noticeable.fold(f64::INFINITY, f64::min)
+        self.solves.rows.minimum(self.least)
     }
 
     fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {

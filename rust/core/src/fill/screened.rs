@@ -18,7 +18,7 @@
 //! Influence dies away within a few h, so a column is zero in most of the mesh, and is not even stored there. For the same
 //! reason a part of the mesh can be solved again by itself, held at what each of the four solves has found around it ([`Patch`]).
 
-use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver, Term};
+use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver, Term, Workspace};
 
 use super::block::{Block, BlockRows, Places, Solves, SparseColumns};
 use super::rows::Ragged;
@@ -228,34 +228,40 @@ impl<'b> Group<'_, 'b> {
         let (given, added) =
             (solver.collect(|k, out| self.append(k, 1.0, out)), solver.collect(|k, out| self.add(k, out)));
         let (once, pull) = (|_: usize| 1.0, |k: usize| confidence[k]);
-        let first = self.substitute(self.right_hand(0, &[(&given, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
-        let second = self.substitute(self.right_hand(1, &[(&first, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
+        let mut work = Workspace::default();
+        let mut solve = |solve: usize, terms: &[Term<'_, 'b>], least: &(dyn Fn(usize) -> f64 + Sync)| {
+            self.substitute(solve, terms, least, &mut work)
+        };
+        let first = solve(0, &[(&given, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
+        let second = solve(1, &[(&first, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
         let scale = |k: usize| confidence[k] * confidence[k] / mass[k];
         let to_given = |k: usize| scale(k) / (REACH * REACH);
         let to_second = |k: usize| -scale(k) * (1.0 / (REACH * REACH) + 1.0);
-        let defect = self.right_hand(CORRECTION, &[(&given, &to_given), (&first, &scale), (&second, &to_second)]);
-        let first = self.screened.screen.with_all_solves.then_some(first);
-        drop(given);
         let least = |k: usize| NEGLIGIBLE * (confidence[k] / mass[k]).max(*least_ratio);
-        let correction = self.substitute(defect, least)?;
-        let corrected =
-            self.right_hand(CORRECTION + 1, &[(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)]);
-        drop(added);
-        let earlier = first.map(|first| [first, second, correction]);
-        Ok(Solves { earlier, rows: self.substitute(corrected, |_| LEAST)? })
+        let correction = solve(CORRECTION, &[(&given, &to_given), (&first, &scale), (&second, &to_second)], &least)?;
+        drop(given);
+        let first = self.screened.screen.with_all_solves.then_some(first);
+        let corrected: [Term; 3] = [(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)];
+        let rows = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
+        Ok(Solves { earlier: first.map(|first| [first, second, correction]), rows })
     }
 
-    /// What solve number `solve` is solved for: the sum of `terms`, and what is held.
-    fn right_hand(&self, solve: usize, terms: &[Term<'_, 'b>]) -> SparseRows<'b> {
-        if self.screened.screen.patch.is_none() {
-            return self.solver.sum(terms);
-        }
-        let held = self.solver.collect(|k, out| self.add_held(solve, k, out));
-        self.solver.sum(&[terms, &[(&held, &|_: usize| 1.0)]].concat())
-    }
-
-    fn substitute(&self, rows: SparseRows<'b>, least: impl Fn(usize) -> f64 + Sync) -> Result<SparseRows<'b>> {
-        let found = self.solver.solve(&rows, least, self.progress.stop());
+    /// The solution of solve number `solve` for the sum of `terms` and what is held.
+    fn substitute(
+        &self,
+        solve: usize,
+        terms: &[Term<'_, 'b>],
+        least: &(dyn Fn(usize) -> f64 + Sync),
+        work: &mut Workspace,
+    ) -> Result<SparseRows<'b>> {
+        let stop = self.progress.stop();
+        let found = match self.screened.screen.patch {
+            None => self.solver.solve(terms, least, work, stop),
+            Some(_) => {
+                let held = self.solver.collect(|k, out| self.add_held(solve, k, out));
+                self.solver.solve(&[terms, &[(&held, &|_: usize| 1.0)]].concat(), least, work, stop)
+            }
+        };
         self.progress.check().map(|()| found)
     }
 

@@ -23,6 +23,8 @@ const REACH: f64 = 8.0;
 const LONGEST: f64 = 0.1;
 /// Most vertices that are solved near a stroke.
 const MOST: usize = 20_000;
+/// Rows whose weights change by less stay as they are: to write them would take longer than to see a difference.
+const NOTICEABLE: f32 = 1e-4;
 /// Fewer unknowns than this are solved as fast as a whole.
 const FEW: usize = 2 * MOST;
 /// With more, what would have to be kept takes too much memory.
@@ -225,10 +227,29 @@ fn replaced(weights: &Weights, chosen: &[bool], append: impl Fn(usize, &mut Row)
             row.clear();
             append(i, row);
             push_normalised(row, out);
-        } else {
+        }
+        if !chosen[i] || is_nearly(out, weights.row(i)) {
+            out.clear();
             out.extend(std::iter::zip(weights.row(i).0, weights.row(i).1).map(|(&bone, &value)| (bone, value)));
         }
     })
+}
+
+/// Whether no weight of a row differs noticeably from that of another, both by bone.
+fn is_nearly(row: &[(u32, f32)], (bones, values): (&[u32], &[f32])) -> bool {
+    let mut others = std::iter::zip(bones, values).peekable();
+    for &(bone, value) in row {
+        while let Some((_, &other)) = others.next_if(|&(&other, _)| other < bone) {
+            if other >= NOTICEABLE {
+                return false;
+            }
+        }
+        let other = others.next_if(|&(&other, _)| other == bone).map_or(0.0, |(_, &other)| other);
+        if (value - other).abs() >= NOTICEABLE {
+            return false;
+        }
+    }
+    row.is_empty() == bones.is_empty() && others.all(|(_, &other)| other < NOTICEABLE)
 }
 
 /// The vertices that the mask says to inpaint are filled in, where anything has changed around them.
