@@ -112,10 +112,15 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
     row, group = np.repeat(np.arange(len(indices), dtype=np.int64), np.diff(rows.indptr)), owned[rows.bones]
     held = _memberships(mesh, indices)
-    if _change_members(obj, indices, held, owned, row, group):
+    if not _are_members(held, row, group) and _change_members(obj, indices, held, owned, row, group):
         held = _memberships(mesh, indices)
     _set_weights(mesh, indices, held, row, group, rows.values)
     mesh.update()
+
+
+def _are_members(held: Memberships, row: NDArray[np.int64], group: NDArray[np.int64]) -> bool:
+    """Whether memberships are those that are there already, without others: as after a first transfer."""
+    return np.array_equal(held.row, row) and np.array_equal(held.group, group)
 
 
 def _change_members(
@@ -193,8 +198,8 @@ def _set_weights(
     values: NDArray[np.float32],
 ) -> None:
     """Give memberships that exist already, (row in `indices`, group), their values."""
-    if np.array_equal(held.row, row) and np.array_equal(held.group, group):
-        now = values  # a garment without other groups, as it is after the first transfer
+    if _are_members(held, row, group):
+        now = values
     else:
         order = np.argsort(_keys(row, group), kind="stable")
         position, found = _find(_keys(row, group)[order], _keys(held.row, held.group))

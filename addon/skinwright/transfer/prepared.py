@@ -56,9 +56,11 @@ class Prepared:
 
     def check_reach(self, params: TransferParams) -> None:
         """Raise NativeError if all is so far away that it must be a mistake; thresholds refuse that by themselves."""
+        if params.method != "confidence":
+            return
         reach = _OUT_OF_REACH * _diagonal(self._shapes[1], self._frame)
         nearest = float(np.min(self.distance, initial=np.inf))
-        if params.method == "confidence" and nearest > reach:
+        if nearest > reach:
             raise native.NativeError(
                 f"{self.name}: nothing matched: its smallest distance from the source is {nearest:.4g}, more than half "
                 "of the source's size: check that both have the same scale and place"
@@ -163,6 +165,9 @@ def in_frame(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDA
 
 def _diagonal(shape: Geometry, frame: NDArray[np.float64]) -> float:
     """Of the box around all vertices that a triangle uses, or around all if there is none."""
+    used = np.zeros(len(shape.positions), bool)
+    used[shape.triangles.reshape(-1)] = True
     positions = in_frame(shape.positions, frame)
-    used = positions[shape.triangles.reshape(-1)] if len(shape.triangles) else positions
-    return float(np.linalg.norm(np.ptp(used, axis=0)))
+    positions = positions if used.all() or not used.any() else positions[used]
+    coordinates = np.ascontiguousarray(positions.T)  # NumPy is slow along the longer axis
+    return float(np.linalg.norm(np.ptp(coordinates, axis=1)))

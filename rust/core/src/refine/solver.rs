@@ -361,13 +361,16 @@ impl Frame<'_> {
         (moved, left)
     }
 
+    /// Restores the volume about a limb's joint. Elsewhere the ends of the region hardly move rigidly about it, so that the
+    /// body's whole volume decides if it is known; beside a chest not at all.
     fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
-        if self.settings.volume == 0.0 {
+        let joint = self.active[k].joint;
+        let is_measured = joint.is_limb || joint.is_slim && !self.has_whole(pose);
+        if self.settings.volume == 0.0 || !is_measured {
             return;
         }
         let region = Arc::clone(&self.local.region);
         let members = &region.free[k];
-        let joint = self.active[k].joint;
         let crease = self.crease(k, axis, 1.0, members);
         let mut contacts =
             crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
