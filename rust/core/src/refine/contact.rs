@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use glam::Vec3;
 
-use super::pairs::{intersecting_pairs, intersecting_pairs_of};
+use super::pairs::{Slabs, intersecting_pairs, intersecting_pairs_of};
 use super::region::Region;
 use super::surface::Surface;
 
@@ -90,20 +90,20 @@ impl Contact {
     }
 
     /// The pairs of all of the skin's triangles that do not intersect at rest.
-    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3]) -> Vec<[u32; 2]> {
-        self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>())
+    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
+        self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>(), slabs)
     }
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
     /// which is the outer one cannot be told: pushing and smoothing would eat them up.
-    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
-        let mut pairs = self.pairs(skin, places, among);
+    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32], slabs: &Slabs) -> Vec<[u32; 2]> {
+        let mut pairs = self.pairs(skin, places, among, slabs);
         pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
         pairs
     }
 
-    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
-        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among);
+    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32], slabs: &Slabs) -> Vec<[u32; 2]> {
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among, slabs);
         pairs.retain(|&[a, b]| {
             let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
@@ -122,8 +122,9 @@ impl Contact {
         places: &mut Vec<Vec3>,
         suspects: &[u32],
         farthest: f32,
+        slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
-        let mut pairs = self.own_pairs(skin, places, suspects);
+        let mut pairs = self.own_pairs(skin, places, suspects, slabs);
         if pairs.is_empty() {
             return (Vec::new(), 0);
         }
@@ -143,7 +144,7 @@ impl Contact {
                     now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
                 }
                 moved.extend(pushed);
-                left = self.own_pairs(skin, &now, &among);
+                left = self.own_pairs(skin, &now, &among, slabs);
                 stalled += 1;
                 if left.len() < pairs.len() {
                     stalled = 0;

@@ -14,6 +14,7 @@ mod frame;
 mod joints;
 mod lattice;
 mod local;
+mod membrane;
 mod morton;
 mod node_weights;
 mod number;
@@ -33,6 +34,7 @@ mod whole;
 
 use glam::{DAffine3, Vec3};
 
+use self::pairs::Slabs;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 pub use self::projection::Kernel;
@@ -174,7 +176,7 @@ impl Refiner {
         }
         if self.settings.self_collision && quality == Quality::Bake {
             let start = std::time::Instant::now();
-            self.part_limbs(&mut positions);
+            self.part_limbs(&mut positions, &solution.slabs);
             solution.report.stages.push(("limbs", start.elapsed().as_secs_f64() * 1e3));
         }
         solution.report.stages.insert(0, ("skin", skinned));
@@ -182,13 +184,13 @@ impl Refiner {
     }
 
     /// Limb against limb, limb against torso: over the whole skin, once more.
-    fn part_limbs(&self, positions: &mut [[f32; 3]]) {
+    fn part_limbs(&self, positions: &mut [[f32; 3]], slabs: &Slabs) {
         let surface = &self.prepared.surface;
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
         let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
         let before = self.lost(&places);
-        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
+        if self.prepared.contact.part(surface, &mut places, &suspects, farthest, slabs).0.is_empty() {
             return;
         }
         // Layers of cloth can be smoothed away; they had better pass through each other.

@@ -1,6 +1,6 @@
 //! Pairs of triangles that pass through each other.
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::morton::morton;
@@ -11,6 +11,8 @@ const WIDE: usize = 8;
 const RUN: usize = 16;
 /// Steps of the Morton curve's grid along the longest side.
 const STEPS: f32 = (1 << 20) as f32;
+/// What rounding changes at most in the distance of a point along a direction, as a share of its coordinates.
+const ROUNDING: f32 = 1e-6;
 
 /// Every pair of triangles that intersect and share no corner, each once, ascending.
 pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
@@ -21,55 +23,148 @@ pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec
     let scale = STEPS / (high - low).max_element().max(f32::MIN_POSITIVE);
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     order.sort_by_cached_key(|&t| (morton(((centre(&triangles[t as usize]) - low) * scale).as_ivec3().to_array()), t));
-    intersecting_pairs_of(&places, triangles, &order)
+    intersecting_pairs_of(&places, triangles, &order, &Slabs::new([]))
 }
 
-/// A triangle's box, and its number.
+/// Directions across which triangles are bounded: the axes, and planes that skin is pressed against. It fills boxes that lie
+/// in each other where a plane slants, but only thin slabs along the plane's normal.
+#[derive(Debug, Clone)]
+pub(super) struct Slabs(Vec<Vec3>);
+
+impl Slabs {
+    /// How many normals are worth their tests.
+    const MOST: usize = 5;
+
+    /// Along the axes and the first few of `normals`.
+    pub(super) fn new(normals: impl IntoIterator<Item = Vec3>) -> Self {
+        Self([Vec3::X, Vec3::Y, Vec3::Z].into_iter().chain(normals.into_iter().take(Self::MOST)).collect())
+    }
+}
+
+/// Triangles' extents along each direction of [`Slabs`], by eights, and those of eights by eights again.
+struct Tree<'a> {
+    slabs: &'a Slabs,
+    levels: Vec<Vec<Eight>>,
+}
+
+/// Extents of eight along one direction, from and to. What is missing in the last ones overlaps nothing.
 #[derive(Clone, Copy)]
-struct Bounds {
-    low: Vec3A,
-    high: Vec3A,
-    triangle: u32,
+struct Eight([[Vec4; 2]; 2]);
+
+/// An extent along each direction.
+type Extents = [[f32; 2]; 3 + Slabs::MOST];
+const NOWHERE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+
+impl Eight {
+    fn new(extents: &[Extents], direction: usize) -> Self {
+        let of = |k: usize| extents.get(k).map_or(NOWHERE, |extents| extents[direction]);
+        let four = |first: usize, end: usize| Vec4::from_array([0, 1, 2, 3].map(|k| of(first + k)[end]));
+        Self([0, 1].map(|end| [four(0, end), four(4, end)]))
+    }
+
+    /// Of one of them, or of all.
+    fn one(&self, k: usize) -> [f32; 2] {
+        self.0.map(|ends| ends[k / 4][k % 4])
+    }
+
+    fn all(&self) -> [f32; 2] {
+        let [[a, b], [c, d]] = self.0;
+        [a.min(b).min_element(), c.max(d).max_element()]
+    }
+
+    /// A bit for each that overlaps an extent.
+    fn overlapping(&self, [from, to]: [f32; 2]) -> u32 {
+        let (from, to) = (Vec4::splat(from), Vec4::splat(to));
+        let half = |k: usize| (self.0[0][k].cmple(to) & self.0[1][k].cmpge(from)).bitmask();
+        half(0) | half(1) << 4
+    }
 }
 
-impl Bounds {
-    fn overlaps(&self, other: &Self) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+impl<'a> Tree<'a> {
+    fn new(slabs: &'a Slabs, places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Self {
+        let count = slabs.0.len();
+        let of_group = |group: &[u32]| {
+            let extents = |&t: &u32| extents(slabs, triangles[t as usize].map(|i| places[i as usize]));
+            let (mut eight, mut some) = ([[NOWHERE; 3 + Slabs::MOST]; WIDE], group.iter().map(extents));
+            eight.iter_mut().zip(&mut some).for_each(|(one, extents)| *one = extents);
+            (0..count).map(move |direction| Eight::new(&eight, direction))
+        };
+        let leaves = among.par_chunks(WIDE).with_min_len(RUN).flat_map_iter(of_group).collect();
+        let mut tree = Self { slabs, levels: vec![leaves] };
+        while tree.levels[tree.levels.len() - 1].len() > count {
+            tree.levels.push(tree.above());
+        }
+        tree
     }
 
-    /// Of all of them; the number of the first.
-    fn around(boxes: &[Self]) -> Self {
-        let joined = |a: Self, b: &Self| Self { low: a.low.min(b.low), high: a.high.max(b.high), ..a };
-        boxes[1..].iter().fold(boxes[0], joined)
+    /// The last level's eights, by eights.
+    fn above(&self) -> Vec<Eight> {
+        let (count, below) = (self.slabs.0.len(), &self.levels[self.levels.len() - 1]);
+        let of_group = |group: &[Eight]| {
+            let mut eight = [[NOWHERE; 3 + Slabs::MOST]; WIDE];
+            for (one, directions) in eight.iter_mut().zip(group.chunks(count)) {
+                one.iter_mut().zip(directions).for_each(|(extent, direction)| *extent = direction.all());
+            }
+            (0..count).map(move |direction| Eight::new(&eight, direction))
+        };
+        below.chunks(WIDE * count).flat_map(of_group).collect()
     }
+
+    /// A bit for each child of a node that overlaps `extents`.
+    fn overlapping(&self, level: usize, node: usize, extents: &Extents) -> u32 {
+        let count = self.slabs.0.len();
+        let directions = self.levels[level][node * count..(node + 1) * count].iter().zip(extents);
+        let mut bits = 0xff;
+        for (direction, &extent) in directions {
+            bits &= direction.overlapping(extent);
+            if bits == 0 {
+                break;
+            }
+        }
+        bits
+    }
+
+    /// Of a whole leaf, or of one triangle in it.
+    fn extents(&self, leaf: usize, of: impl Fn(&Eight) -> [f32; 2]) -> Extents {
+        let count = self.slabs.0.len();
+        let mut extents = [NOWHERE; 3 + Slabs::MOST];
+        let directions = &self.levels[0][leaf * count..(leaf + 1) * count];
+        extents.iter_mut().zip(directions).for_each(|(extent, direction)| *extent = of(direction));
+        extents
+    }
+}
+
+fn extents(slabs: &Slabs, corners: [Vec3; 3]) -> Extents {
+    // What rounding may change: no pair that intersects may be lost.
+    let largest = corners.map(Vec3::abs).iter().fold(Vec3::ZERO, |most, &p| most.max(p));
+    let pad = ROUNDING * largest.element_sum();
+    let mut extents = [NOWHERE; 3 + Slabs::MOST];
+    for (extent, direction) in extents.iter_mut().zip(&slabs.0) {
+        let [a, b, c] = corners.map(|p| p.dot(*direction));
+        *extent = [a.min(b).min(c) - pad, a.max(b).max(c) + pad];
+    }
+    extents
 }
 
 /// The same among some triangles, which are fast to compare where neighbours in the list lie near each other.
-///
-/// Boxes are joined by eights, and those by eights again. Each group of eight looks for others that overlap.
-pub(super) fn intersecting_pairs_of(places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Vec<[u32; 2]> {
-    let bounds = |&triangle: &u32| {
-        let [a, b, c] = triangles[triangle as usize].map(|i| Vec3A::from(places[i as usize]));
-        Bounds { low: a.min(b).min(c), high: a.max(b).max(c), triangle }
-    };
-    let mut levels: Vec<Vec<Bounds>> = vec![among.par_iter().with_min_len(RUN * WIDE).map(bounds).collect()];
-    while levels[levels.len() - 1].len() > WIDE {
-        let groups = levels[levels.len() - 1].chunks(WIDE).map(Bounds::around).collect();
-        levels.push(groups);
+pub(super) fn intersecting_pairs_of(
+    places: &[Vec3],
+    triangles: &[[u32; 3]],
+    among: &[u32],
+    slabs: &Slabs,
+) -> Vec<[u32; 2]> {
+    if among.is_empty() {
+        return Vec::new();
     }
-    let search = Search { places, triangles, levels: &levels };
-    let of_group = |group: usize| {
+    let search = Search { places, triangles, among, tree: Tree::new(slabs, places, triangles, among) };
+    let of_leaf = |leaf: usize| {
         let mut pairs = Vec::new();
-        let top = levels.len() - 1;
-        if top == 0 {
-            search.compare(0, 0, &mut pairs);
-        } else {
-            (0..levels[top].len()).for_each(|k| search.descend(top, k, group, &mut pairs));
-        }
+        let extents = search.tree.extents(leaf, Eight::all);
+        search.descend(search.tree.levels.len() - 1, 0, leaf, &extents, &mut pairs);
         pairs
     };
-    let groups = levels[0].len().div_ceil(WIDE);
-    let found = (0..groups).into_par_iter().with_min_len(RUN).flat_map_iter(of_group);
+    let leaves = among.len().div_ceil(WIDE);
+    let found = (0..leaves).into_par_iter().with_min_len(RUN).flat_map_iter(of_leaf);
     let mut pairs: Vec<[u32; 2]> = found.collect();
     pairs.sort_unstable();
     pairs
@@ -78,34 +173,37 @@ pub(super) fn intersecting_pairs_of(places: &[Vec3], triangles: &[[u32; 3]], amo
 struct Search<'a> {
     places: &'a [Vec3],
     triangles: &'a [[u32; 3]],
-    levels: &'a [Vec<Bounds>],
+    among: &'a [u32],
+    tree: Tree<'a>,
 }
 
 impl Search<'_> {
-    /// Compares group `own` of triangles with those under box `k` of a level that do not come before it.
-    fn descend(&self, level: usize, k: usize, own: usize, pairs: &mut Vec<[u32; 2]>) {
-        let last_below = (k + 1) * WIDE.pow(level as u32 - 1) - 1;
-        if last_below < own || !self.levels[1][own].overlaps(&self.levels[level][k]) {
-            return;
+    /// Compares the triangles of leaf `own`, which lie within `extents`, with those under a node that do not come before it.
+    fn descend(&self, level: usize, node: usize, own: usize, extents: &Extents, pairs: &mut Vec<[u32; 2]>) {
+        let near = self.tree.overlapping(level, node, extents);
+        if level == 0 {
+            return self.compare(own, node, near, pairs);
         }
-        if level == 1 {
-            return self.compare(own, k, pairs);
+        for child in ones(near).map(|k| node * WIDE + k) {
+            if (child + 1) * WIDE.pow(level as u32 - 1) > own {
+                self.descend(level - 1, child, own, extents, pairs);
+            }
         }
-        let end = ((k + 1) * WIDE).min(self.levels[level - 1].len());
-        (k * WIDE..end).for_each(|child| self.descend(level - 1, child, own, pairs));
     }
 
-    fn compare(&self, own: usize, other: usize, pairs: &mut Vec<[u32; 2]>) {
-        let boxes = &self.levels[0];
-        let range = |group: usize| group * WIDE..((group + 1) * WIDE).min(boxes.len());
-        for i in range(own) {
-            let (a, from) = (&boxes[i], if own == other { i + 1 } else { 0 });
-            if self.levels.get(1).is_some_and(|groups| !a.overlaps(&groups[other])) {
+    /// Compares the triangles of leaf `own` with those of `near`, bits of another leaf.
+    fn compare(&self, own: usize, other: usize, near: u32, pairs: &mut Vec<[u32; 2]>) {
+        let group = &self.among[own * WIDE..self.among.len().min((own + 1) * WIDE)];
+        for (i, &a) in group.iter().enumerate() {
+            let later = if own == other { near & (!1 << i) } else { near };
+            if later == 0 {
                 continue;
             }
-            for b in range(other).filter(|&j| j >= from).map(|j| &boxes[j]) {
-                if a.overlaps(b) && self.intersect(a.triangle, b.triangle) {
-                    pairs.push([a.triangle.min(b.triangle), a.triangle.max(b.triangle)]);
+            let extents = self.tree.extents(own, |eight| eight.one(i));
+            for k in ones(later & self.tree.overlapping(0, other, &extents)) {
+                let b = self.among[other * WIDE + k];
+                if self.intersect(a, b) {
+                    pairs.push([a.min(b), a.max(b)]);
                 }
             }
         }
@@ -113,16 +211,27 @@ impl Search<'_> {
 
     /// Whether an edge of one passes through the inside of the other. Triangles that share a corner never count.
     fn intersect(&self, s: u32, t: u32) -> bool {
-        let (s, t) = (self.triangles[s as usize], self.triangles[t as usize]);
-        if s.iter().any(|i| t.contains(i)) {
+        let ([a, b, c], t) = (self.triangles[s as usize], self.triangles[t as usize]);
+        if t.iter().fold(false, |shared, &i| shared | (i == a) | (i == b) | (i == c)) {
             return false;
         }
-        let [s, t] = [s, t].map(|corners| corners.map(|i| self.places[i as usize].as_dvec3()));
+        let [s, t] = [[a, b, c], t].map(|corners| corners.map(|i| self.places[i as usize].as_dvec3()));
         if on_one_side(&s, &t) || on_one_side(&t, &s) {
             return false;
         }
         (0..3).any(|k| passes(s[k], s[(k + 1) % 3], &t) || passes(t[k], t[(k + 1) % 3], &s))
     }
+}
+
+/// Which bits are set.
+fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let k = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            k
+        })
+    })
 }
 
 /// Whether all of one triangle lies strictly on one side of the other's plane, as most neighbours do.

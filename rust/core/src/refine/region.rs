@@ -42,6 +42,8 @@ pub(super) struct Region {
     /// Rings of local surface vertices, whole rings only for free ones.
     ring_starts: Vec<u32>,
     rings: Vec<u32>,
+    /// How far those neighbours are at rest.
+    ring_lengths: Vec<f32>,
     /// Triangles over local particles with a free corner.
     pub(super) triangles: Vec<[u32; 3]>,
     /// Their numbers in the surface.
@@ -115,6 +117,7 @@ impl Region {
             known.map(|m| Member { particle: map(m.particle), ..*m }).collect::<Vec<_>>()
         };
         let (ring_starts, rings) = rings(prepared, &global[nodes..], &local);
+        let ring_lengths = lengths(prepared, &global, nodes, &ring_starts, &rings);
         let named = |&t: &u32| prepared.surface.triangles[t as usize].map(|i| map(surface(i)));
         Self {
             nodes,
@@ -127,6 +130,7 @@ impl Region {
             beyond: active.iter().map(|joint| members(&mut joint.beyond())).collect(),
             ring_starts,
             rings,
+            ring_lengths,
             triangles: chosen.triangles.iter().map(named).collect(),
             triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island(t)).collect(),
             triangle_names: chosen.triangles,
@@ -138,6 +142,12 @@ impl Region {
     pub(super) fn ring(&self, particle: u32) -> &[u32] {
         let i = particle as usize - self.nodes;
         &self.rings[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
+    }
+
+    /// The distances of those neighbours at rest.
+    pub(super) fn ring_lengths(&self, particle: u32) -> &[f32] {
+        let i = particle as usize - self.nodes;
+        &self.ring_lengths[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
     }
 
     /// Whether a local particle moves freely.
@@ -194,6 +204,16 @@ impl Chosen {
 /// The numbers below `count` that `keep` accepts, ascending.
 fn kept(count: usize, keep: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
     (0..count).into_par_iter().with_min_len(RUN).filter(|&k| keep(k)).map(|k| k as u32).collect()
+}
+
+/// The distance at rest between each surface vertex and each neighbour.
+fn lengths(prepared: &Prepared, global: &[u32], nodes: usize, starts: &[u32], rings: &[u32]) -> Vec<f32> {
+    let rest = |p: usize| prepared.rest[global[p] as usize];
+    let of_vertex = |(i, ends): (usize, &[u32])| {
+        let ring = &rings[ends[0] as usize..ends[1] as usize];
+        ring.iter().map(move |&n| rest(nodes + i).distance(rest(n as usize)))
+    };
+    starts.windows(2).enumerate().flat_map(of_vertex).collect()
 }
 
 fn rings(prepared: &Prepared, vertices: &[u32], local: &[u32]) -> (Vec<u32>, Vec<u32>) {

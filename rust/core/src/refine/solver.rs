@@ -12,6 +12,7 @@ use super::crease::{Crease, bind_skin, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
 use super::joints::Member;
 use super::local::Local;
+use super::pairs::Slabs;
 use super::predictor::{follow, linear, place_all, place_bound, skinned};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
 use super::projection::{Flesh, Kernel, Stretch, project, untangle};
@@ -60,6 +61,8 @@ pub(super) struct Solution {
     /// Surface vertices that the solver moved, and their places in cells.
     pub(super) moved: Vec<(u32, Vec3)>,
     pub(super) report: Report,
+    /// Across which triangles are told apart.
+    pub(super) slabs: Slabs,
 }
 
 /// How a frame is solved.
@@ -83,14 +86,22 @@ pub(super) fn solve(
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
     if active.is_empty() {
-        return Solution { moved: Vec::new(), report: Report::default() };
+        return Solution { moved: Vec::new(), report: Report::default(), slabs: Slabs::new([]) };
     }
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
-    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
+    let slabs = slabs(&active, pose);
+    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
-    Solution { moved: frame.moved(), report }
+    Solution { moved: frame.moved(), report, slabs: frame.slabs }
+}
+
+/// Across the planes of the joints that bend most.
+fn slabs(active: &[ActiveJoint<'_>], pose: &[DAffine3]) -> Slabs {
+    let mut limbs: Vec<&ActiveJoint<'_>> = active.iter().filter(|active| active.joint.is_limb).collect();
+    limbs.sort_by(|a, b| b.swing.total_cmp(&a.swing));
+    Slabs::new(limbs.iter().filter_map(|a| Some(a.plane(&posed_axis(a.joint, pose), 1.0)?.normal)))
 }
 
 /// Volume and bulge of every active joint for skin at given places (welded surface vertices, in cells).
@@ -104,7 +115,8 @@ pub(super) fn measure(
     let active = active_joints(&prepared.joints, &path, pose);
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
-    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
+    let slabs = Slabs::new([]);
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -128,6 +140,7 @@ pub(super) struct Frame<'a> {
     kernel: Kernel,
     clock: Clock,
     iterations: usize,
+    slabs: Slabs,
 }
 
 impl Frame<'_> {
@@ -203,28 +216,29 @@ impl Frame<'_> {
 
     /// Bind, planes and membranes of every joint. Returns the skin of the membranes.
     fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) -> Vec<u32> {
+        let (region, most) = (Arc::clone(&self.local.region), self.settings.bind as f32);
         let mut membranes = Vec::new();
         for (k, active) in self.active.iter().enumerate() {
-            let region = Arc::clone(&self.local.region);
-            let members = &region.free[k];
-            if self.settings.bind > 0.0 && active.joint.is_limb {
-                bind_skin(&mut self.local, &axes[k], members, self.settings.bind as f32);
+            let binds = most > 0.0 && active.joint.is_limb;
+            match (self.crease(k, &axes[k], share, &region.free[k]), binds) {
+                (Some(crease), true) => crease.bind_and_separate(&mut self.local, most),
+                (Some(crease), false) => crease.separate(&mut self.local),
+                (None, true) => bind_skin(&mut self.local, &axes[k], &region.free[k], most),
+                (None, false) => {}
             }
-            if let Some(crease) = self.crease(k, &axes[k], share, members) {
-                crease.separate(&mut self.local);
-                membranes.extend(crease.relax(&mut self.local, &self.prepared.rest, passes));
+            if let Some(crease) = self.crease(k, &axes[k], share, &region.free[k]) {
+                membranes.extend(crease.relax(&mut self.local, passes));
             }
         }
         membranes
     }
 
-    /// Planes alone.
+    /// Planes alone, which the lattice may have left when it followed its skin.
     fn separate(&mut self, axes: &[Axis], share: f32) {
+        let region = Arc::clone(&self.local.region);
         for k in 0..self.active.len() {
-            let region = Arc::clone(&self.local.region);
-            let members = &region.free[k];
-            if let Some(crease) = self.crease(k, &axes[k], share, members) {
-                crease.separate(&mut self.local);
+            if let Some(crease) = self.crease(k, &axes[k], share, &region.free[k]) {
+                crease.separate_nodes(&mut self.local);
             }
         }
     }
@@ -325,7 +339,7 @@ impl Frame<'_> {
 
     /// The pairs of the region's triangles that pass through each other, but for those that do at rest.
     fn pairs(&self, places: &[Vec3]) -> Vec<[u32; 2]> {
-        self.prepared.contact.all_pairs(&*self.local.region, places)
+        self.prepared.contact.all_pairs(&*self.local.region, places, &self.slabs)
     }
 
     /// Puts a joint's skin where skinning has it.
@@ -353,7 +367,7 @@ impl Frame<'_> {
             return (Vec::new(), 0);
         }
         let mut places = self.places();
-        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST);
+        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST, &self.slabs);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
@@ -372,16 +386,16 @@ impl Frame<'_> {
         let mut contacts =
             crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
         contacts.extend(parted);
-        let kept = within(&self.local, &self.prepared.rest, &contacts, KEPT * joint.radius);
+        let kept = within(&self.local, &contacts, KEPT * joint.radius);
         let balloon = Balloon::new(&self.local, members, &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let most = if joint.is_limb { self.settings.bind as f32 } else { 0.0 };
         balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
-            if most > 0.0 {
-                bind_skin(local, axis, members, most);
-            }
-            if let Some(crease) = crease {
-                crease.separate(local);
+            match crease {
+                Some(crease) if most > 0.0 => crease.bind_and_separate(local, most),
+                Some(crease) => crease.separate(local),
+                None if most > 0.0 => bind_skin(local, axis, members, most),
+                None => {}
             }
         });
     }
@@ -421,7 +435,7 @@ impl Frame<'_> {
     /// Volume of a joint's region against rest, and the farthest that its skin is from the bones against rest.
     fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &(dyn Fn(u32) -> Vec3 + Sync)) -> (f64, f64) {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
-        let balloon = Balloon::new(&self.local, members, &[]);
+        let balloon = Balloon::still(&self.local, members);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let volume = balloon.volume(axis.origin, at);
         let skin = members.iter().filter(|m| self.local.is_surface(m.particle) && m.distance > 0.2 * joint.radius);

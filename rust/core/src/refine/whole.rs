@@ -83,10 +83,10 @@ impl Frame<'_> {
             let radius = self.active[k].joint.radius;
             let crease = self.crease(k, axis, 1.0, &self.local.region.free[k]);
             let contacts = crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * radius)).unwrap_or_default();
-            kept.extend(within(&self.local, &self.prepared.rest, &contacts, KEPT * radius));
+            kept.extend(within(&self.local, &contacts, KEPT * radius));
         }
         let radius = self.active.iter().map(|active| active.joint.radius).fold(f32::INFINITY, f32::min);
-        kept.extend(within(&self.local, &self.prepared.rest, parted, KEPT * radius));
+        kept.extend(within(&self.local, parted, KEPT * radius));
         kept
     }
 }

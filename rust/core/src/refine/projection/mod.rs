@@ -9,6 +9,7 @@ mod batch;
 mod blocks;
 mod colouring;
 mod kind;
+mod look;
 mod register;
 mod untangle;
 #[cfg(target_arch = "x86_64")]
