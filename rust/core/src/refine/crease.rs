@@ -2,10 +2,8 @@
 
 use std::collections::VecDeque;
 
-use glam::Vec3;
-
-use super::constraint::{Axis, HalfSpace, bind};
-use super::coupling::{place, shift_members};
+use super::constraint::{Axis, HalfSpace};
+use super::coupling::place;
 use super::joints::Member;
 use super::local::Local;
 use super::membrane::Membrane;
@@ -37,39 +35,6 @@ pub(super) struct Crease<'a> {
 }
 
 impl Crease<'_> {
-    /// Puts lattice and skin back on their own sides.
-    pub(super) fn separate(&self, local: &mut Local) {
-        self.separate_some(local, self.members);
-    }
-
-    /// The lattice alone.
-    pub(super) fn separate_nodes(&self, local: &mut Local) {
-        self.separate_some(local, self.parts(local).0);
-    }
-
-    fn separate_some(&self, local: &mut Local, members: &[Member]) {
-        let nodes = local.nodes;
-        shift_members(&mut local.particles, members, |at, member| self.back(at, member, nodes));
-    }
-
-    /// The same, and before that skin back to at most `most` times its distance from the bones at rest.
-    pub(super) fn bind_and_separate(&self, local: &mut Local, most: f32) {
-        let nodes = local.nodes;
-        shift_members(&mut local.particles, self.members, |at, member| {
-            if (member.particle as usize) < nodes {
-                return self.back(at, member, nodes);
-            }
-            let bound = bind(&self.axis, at, 0.0, most * member.distance);
-            bound + self.back(at + bound, member, nodes)
-        });
-    }
-
-    /// The move that puts a member back on its own side.
-    fn back(&self, at: Vec3, member: &Member, nodes: usize) -> Vec3 {
-        let is_skin = member.particle as usize >= nodes;
-        if member.side == 0.0 && !is_skin { Vec3::ZERO } else { self.plane.back(at, self.plane.heights(member.side)) }
-    }
-
     /// Lattice nodes, then skin.
     fn parts(&self, local: &Local) -> (&[Member], &[Member]) {
         self.members.split_at(self.members.partition_point(|m| (m.particle as usize) < local.nodes))
@@ -98,27 +63,16 @@ impl Crease<'_> {
         ((smoothing * wanted / repeats).min(MOST_SMOOTHING), repeats as usize)
     }
 
-    /// Passes of the membrane: towards the neighbours' mean, then back to the own side. Returns its vertices.
-    pub(super) fn relax(&self, local: &mut Local, passes: usize) -> Vec<u32> {
+    /// The skin in contact and what lies near it, if any is.
+    pub(super) fn membrane(&self, local: &Local) -> Option<Membrane> {
         let contacts = self.contacts(local, TOUCH * self.radius);
         if contacts.is_empty() {
-            return contacts;
+            return None;
         }
         let near = within(local, &contacts, WIDTH * self.radius);
         let (smoothing, repeats) = self.fineness(local, &contacts);
-        let mut membrane = Membrane::new(local, &near);
-        membrane.hold(&self.plane, self.parts(local).1);
-        (0..passes * repeats).for_each(|_| membrane.pass(&self.plane, smoothing));
-        membrane.put_back(local);
-        near
+        Some(Membrane::new(local, &near, self.parts(local).1, smoothing, repeats))
     }
-}
-
-/// Puts the skin of a joint back to at most `most` times its distance from the bones at rest.
-pub(super) fn bind_skin(local: &mut Local, axis: &Axis, members: &[Member], most: f32) {
-    let first = members.partition_point(|m| (m.particle as usize) < local.nodes);
-    let limit = |at: Vec3, member: &Member| bind(axis, at, 0.0, most * member.distance);
-    shift_members(&mut local.particles, &members[first..], limit);
 }
 
 /// Free skin not farther from `seeds` along edges at rest than `distance`, seeds included, ascending.

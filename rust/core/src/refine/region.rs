@@ -8,7 +8,7 @@ use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
-use super::projection::{Batch, Blocks};
+use super::projection::{Batch, Blocks, Colouring};
 
 const NONE: u32 = u32::MAX;
 /// Constraints that one task looks at.
@@ -20,6 +20,29 @@ pub(super) struct Hung {
     pub(super) vertex: u32,
     pub(super) nodes: [u32; 4],
     pub(super) shares: [f32; 4],
+}
+
+/// The free particles of a joint with what limits them: skin with its distance from the bones and its side of the plane,
+/// lattice nodes with their side.
+#[derive(Debug)]
+pub(super) struct Limited {
+    pub(super) skin: Batch<1, 2>,
+    pub(super) nodes: Batch<1, 1>,
+}
+
+impl Limited {
+    /// Of `members`, nodes first.
+    fn new(lattice: Blocks, skin: Blocks, members: &[Member], nodes: usize) -> Self {
+        let (of_nodes, of_skin) = members.split_at(members.partition_point(|m| (m.particle as usize) < nodes));
+        let colours = Colouring::single(members.len());
+        let all: Vec<u32> = (0..of_skin.len() as u32).collect();
+        let (node, vertex) = (|k: u32| &of_nodes[k as usize], |k: u32| &of_skin[k as usize]);
+        let sided: Vec<u32> = (0..of_nodes.len() as u32).filter(|&k| node(k).side != 0.0).collect();
+        Self {
+            skin: Batch::new(skin, &colours, &all, |k| [vertex(k).particle], |k| [vertex(k).distance, vertex(k).side]),
+            nodes: Batch::new(lattice, &colours, &sided, |k| [node(k).particle], |k| [node(k).side]),
+        }
+    }
 }
 
 /// Particles and constraints of a frame, as far as they depend on which joints are active and how far they reach.
@@ -37,6 +60,8 @@ pub(super) struct Region {
     pub(super) hung: Vec<Hung>,
     /// Members of each active joint with local indices, the free ones: nodes first, as everywhere.
     pub(super) free: Vec<Vec<Member>>,
+    /// The free ones as the kernels take them.
+    pub(super) limited: Vec<Limited>,
     /// Those beyond.
     pub(super) beyond: Vec<Vec<Member>>,
     /// Rings of local surface vertices, whole rings only for free ones.
@@ -116,6 +141,8 @@ impl Region {
             let known = chosen.filter(|m| map(m.particle) != NONE);
             known.map(|m| Member { particle: map(m.particle), ..*m }).collect::<Vec<_>>()
         };
+        let free: Vec<Vec<Member>> = active.iter().map(|joint| members(&mut joint.free())).collect();
+        let limited = free.par_iter().map(|members| Limited::new(lattice, skin, members, nodes)).collect();
         let (ring_starts, rings) = rings(prepared, &global[nodes..], &local);
         let ring_lengths = lengths(prepared, &global, nodes, &ring_starts, &rings);
         let named = |&t: &u32| prepared.surface.triangles[t as usize].map(|i| map(surface(i)));
@@ -126,7 +153,8 @@ impl Region {
             sides,
             tetrahedra,
             hung: hung.collect(),
-            free: active.iter().map(|joint| members(&mut joint.free())).collect(),
+            free,
+            limited,
             beyond: active.iter().map(|joint| members(&mut joint.beyond())).collect(),
             ring_starts,
             rings,

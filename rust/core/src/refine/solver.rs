@@ -1,21 +1,20 @@
 //! One frame: the path from rest in sub-angles, each a few projections and a relaxed crease; then the volume.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
-use super::constraint::Axis;
+use super::constraint::{Axis, HalfSpace};
 use super::coupling::{carry_lattice, carry_skin, place};
-use super::crease::{Crease, bind_skin, within};
+use super::crease::{Crease, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
-use super::joints::Member;
 use super::local::Local;
+use super::membrane::Membrane;
 use super::pairs::Slabs;
 use super::predictor::{follow, linear, place_all, place_bound, skinned};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
-use super::projection::{Flesh, Kernel, Stretch, project, untangle};
+use super::projection::{Flesh, Kernel, Limits, Stretch, project, untangle};
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -90,7 +89,8 @@ pub(super) fn solve(
     }
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let slabs = slabs(&active, pose);
-    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs };
+    let membranes = active.iter().map(|_| None).collect();
+    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
@@ -115,8 +115,8 @@ pub(super) fn measure(
     let active = active_joints(&prepared.joints, &path, pose);
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
-    let slabs = Slabs::new([]);
-    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs };
+    let (slabs, membranes) = (Slabs::new([]), Vec::new());
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -137,10 +137,12 @@ pub(super) struct Frame<'a> {
     pub(super) settings: &'a Settings,
     pub(super) active: &'a [ActiveJoint<'a>],
     pub(super) local: Local,
-    kernel: Kernel,
+    pub(super) kernel: Kernel,
     clock: Clock,
     iterations: usize,
     slabs: Slabs,
+    /// Of every joint with skin in contact, for the iterations of one step.
+    membranes: Vec<Option<Membrane>>,
 }
 
 impl Frame<'_> {
@@ -169,6 +171,7 @@ impl Frame<'_> {
             });
             self.clock = clock;
             self.local.restart();
+            self.membranes.fill_with(|| None);
             for iteration in 1..=iterations {
                 self.iterate(&axes, share as f32, quality == Quality::Bake || iteration == iterations);
             }
@@ -184,7 +187,7 @@ impl Frame<'_> {
         clock.time("couple", || carry_skin(&mut self.local, &before, REJOIN));
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
-        clock.time("crease", || _ = self.limit(axes, share, PASSES));
+        clock.time("crease", || self.limit(axes, share, PASSES));
         clock.time("couple", || carry_lattice(&mut self.local, &skin));
         clock.time("crease", || self.separate(axes, share));
         self.iterations += 1;
@@ -214,50 +217,59 @@ impl Frame<'_> {
         }
     }
 
-    /// Bind, planes and membranes of every joint. Returns the skin of the membranes.
-    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) -> Vec<u32> {
-        let (region, most) = (Arc::clone(&self.local.region), self.settings.bind as f32);
-        let mut membranes = Vec::new();
-        for (k, active) in self.active.iter().enumerate() {
-            let binds = most > 0.0 && active.joint.is_limb;
-            match (self.crease(k, &axes[k], share, &region.free[k]), binds) {
-                (Some(crease), true) => crease.bind_and_separate(&mut self.local, most),
-                (Some(crease), false) => crease.separate(&mut self.local),
-                (None, true) => bind_skin(&mut self.local, &axes[k], &region.free[k], most),
-                (None, false) => {}
-            }
-            if let Some(crease) = self.crease(k, &axes[k], share, &region.free[k]) {
-                membranes.extend(crease.relax(&mut self.local, passes));
+    /// Bind, planes and membranes of every joint.
+    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
+        for (k, axis) in axes.iter().enumerate() {
+            let limits = self.limits(k, axis, share);
+            self.local.limit_nodes(self.kernel, k, limits);
+            self.local.limit_skin(self.kernel, k, limits);
+            if let Some(plane) = self.plane(k, axis, share) {
+                if self.membranes[k].is_none() {
+                    self.membranes[k] = self.crease(k, axis, plane).membrane(&self.local);
+                }
+                if let Some(membrane) = &mut self.membranes[k] {
+                    membrane.relax(&mut self.local, &plane, passes);
+                }
             }
         }
-        membranes
     }
 
     /// Planes alone, which the lattice may have left when it followed its skin.
     fn separate(&mut self, axes: &[Axis], share: f32) {
-        let region = Arc::clone(&self.local.region);
-        for k in 0..self.active.len() {
-            if let Some(crease) = self.crease(k, &axes[k], share, &region.free[k]) {
-                crease.separate_nodes(&mut self.local);
-            }
+        for (k, axis) in axes.iter().enumerate() {
+            let limits = self.limits(k, axis, share);
+            self.local.limit_nodes(self.kernel, k, limits);
         }
     }
 
-    pub(super) fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
-        if !self.settings.self_collision {
-            return None;
-        }
-        let plane = self.active[k].plane(axis, share)?;
-        Some(Crease { axis: *axis, plane, radius: self.active[k].joint.radius, members })
+    /// What the particles of joint `k` may not leave.
+    pub(super) fn limits(&self, k: usize, axis: &Axis, share: f32) -> Limits {
+        let most = if self.active[k].joint.is_limb { self.settings.bind as f32 } else { 0.0 };
+        Limits::new(axis, self.plane(k, axis, share).as_ref(), most)
+    }
+
+    fn plane(&self, k: usize, axis: &Axis, share: f32) -> Option<HalfSpace> {
+        if self.settings.self_collision { self.active[k].plane(axis, share) } else { None }
+    }
+
+    fn crease(&self, k: usize, axis: &Axis, plane: HalfSpace) -> Crease<'_> {
+        Crease { axis: *axis, plane, radius: self.active[k].joint.radius, members: &self.local.region.free[k] }
+    }
+
+    /// Skin in contact when a joint has come all the way.
+    pub(super) fn contacts(&self, k: usize, axis: &Axis) -> Vec<u32> {
+        let Some(plane) = self.plane(k, axis, 1.0) else { return Vec::new() };
+        self.crease(k, axis, plane).contacts(&self.local, IN_CONTACT * self.active[k].joint.radius)
     }
 
     /// The last passes over the creases, and the volume.
     fn finish(&mut self, pose: &[DAffine3], skin: &[[f32; 3]], quality: Quality) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
-        let membranes = clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        self.membranes.fill_with(|| None);
+        clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
         let suspects = match quality {
-            Quality::Live => self.triangles_of(membranes),
+            Quality::Live => self.triangles_that_may_fold(),
             Quality::Bake => (0..self.local.triangles.len() as u32).collect(),
         };
         if self.settings.volume > 0.0 {
@@ -352,9 +364,10 @@ impl Frame<'_> {
     }
 
     /// The triangles that may fold: those of the membranes, and all of joints that have none.
-    fn triangles_of(&self, membranes: Vec<u32>) -> Vec<u32> {
+    fn triangles_that_may_fold(&self) -> Vec<u32> {
         let mut may_fold = vec![false; self.local.particles.len()];
         let bare = self.active.iter().zip(&self.local.free).filter(|(active, _)| !active.joint.is_limb);
+        let membranes = self.membranes.iter().flatten().flat_map(Membrane::vertices).copied();
         let particles = bare.flat_map(|(_, members)| members).map(|member| member.particle).chain(membranes);
         particles.for_each(|p| may_fold[p as usize] = true);
         let count = self.local.triangles.len() as u32;
@@ -379,24 +392,15 @@ impl Frame<'_> {
         if self.settings.volume == 0.0 {
             return;
         }
-        let region = Arc::clone(&self.local.region);
-        let members = &region.free[k];
         let joint = self.active[k].joint;
-        let crease = self.crease(k, axis, 1.0, members);
-        let mut contacts =
-            crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
+        let mut contacts = self.contacts(k, axis);
         contacts.extend(parted);
         let kept = within(&self.local, &contacts, KEPT * joint.radius);
-        let balloon = Balloon::new(&self.local, members, &kept);
+        let balloon = Balloon::new(&self.local, &self.local.region.free[k], &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
-        let most = if joint.is_limb { self.settings.bind as f32 } else { 0.0 };
+        let (kernel, limits) = (self.kernel, self.limits(k, axis, 1.0));
         balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
-            match crease {
-                Some(crease) if most > 0.0 => crease.bind_and_separate(local, most),
-                Some(crease) => crease.separate(local),
-                None if most > 0.0 => bind_skin(local, axis, members, most),
-                None => {}
-            }
+            local.limit_skin(kernel, k, limits);
         });
     }
 
