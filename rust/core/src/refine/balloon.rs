@@ -82,7 +82,8 @@ impl Balloon {
         runs.collect::<Vec<f64>>().iter().sum()
     }
 
-    /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round.
+    /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round. Returns what is
+    /// missing then.
     pub(super) fn inflate(
         &self,
         local: &mut Local,
@@ -90,12 +91,12 @@ impl Balloon {
         target: f64,
         radius: f32,
         mut limit: impl FnMut(&mut Local),
-    ) {
+    ) -> f64 {
         let mut normals = vec![Vec3::ZERO; local.particles.len()];
         for round in 0..ROUNDS {
             let missing = target - self.volume(apex, |p| place(&local.particles[p as usize]));
             if missing.abs() < 1e-5 * target.abs() {
-                return;
+                return missing;
             }
             if round % SAME_NORMALS == 0 {
                 self.normals(local, &mut normals);
@@ -108,6 +109,7 @@ impl Balloon {
             }
             limit(local);
         }
+        target - self.volume(apex, |p| place(&local.particles[p as usize]))
     }
 
     /// Sums of the doubled areas around each vertex.

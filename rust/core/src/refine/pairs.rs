@@ -23,7 +23,7 @@ pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec
     let scale = STEPS / (high - low).max_element().max(f32::MIN_POSITIVE);
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     order.sort_by_cached_key(|&t| (morton(((centre(&triangles[t as usize]) - low) * scale).as_ivec3().to_array()), t));
-    intersecting_pairs_of(&places, triangles, &order, &Slabs::new([]))
+    intersecting_pairs_of(&places, triangles, &order, &|_| false, &Slabs::new([]))
 }
 
 /// Directions across which triangles are bounded: the axes, and planes that skin is pressed against. It fills boxes that lie
@@ -44,6 +44,10 @@ impl Slabs {
 /// Triangles' extents along each direction of [`Slabs`], by eights, and those of eights by eights again.
 struct Tree<'a> {
     slabs: &'a Slabs,
+    /// Of each triangle.
+    extents: Vec<Extents>,
+    /// Of each leaf of eight.
+    leaves: Vec<Extents>,
     levels: Vec<Vec<Eight>>,
 }
 
@@ -62,16 +66,6 @@ impl Eight {
         Self([0, 1].map(|end| [four(0, end), four(4, end)]))
     }
 
-    /// Of one of them, or of all.
-    fn one(&self, k: usize) -> [f32; 2] {
-        self.0.map(|ends| ends[k / 4][k % 4])
-    }
-
-    fn all(&self) -> [f32; 2] {
-        let [[a, b], [c, d]] = self.0;
-        [a.min(b).min_element(), c.max(d).max_element()]
-    }
-
     /// A bit for each that overlaps an extent.
     fn overlapping(&self, [from, to]: [f32; 2]) -> u32 {
         let (from, to) = (Vec4::splat(from), Vec4::splat(to));
@@ -82,32 +76,16 @@ impl Eight {
 
 impl<'a> Tree<'a> {
     fn new(slabs: &'a Slabs, places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Self {
-        let count = slabs.0.len();
-        let of_group = |group: &[u32]| {
-            let extents = |&t: &u32| extents(slabs, triangles[t as usize].map(|i| places[i as usize]));
-            let (mut eight, mut some) = ([[NOWHERE; 3 + Slabs::MOST]; WIDE], group.iter().map(extents));
-            eight.iter_mut().zip(&mut some).for_each(|(one, extents)| *one = extents);
-            (0..count).map(move |direction| Eight::new(&eight, direction))
-        };
-        let leaves = among.par_chunks(WIDE).with_min_len(RUN).flat_map_iter(of_group).collect();
-        let mut tree = Self { slabs, levels: vec![leaves] };
-        while tree.levels[tree.levels.len() - 1].len() > count {
-            tree.levels.push(tree.above());
+        let of_one = |&t: &u32| extents(slabs, triangles[t as usize].map(|i| places[i as usize]));
+        let extents: Vec<Extents> = among.par_iter().with_min_len(RUN * WIDE).map(of_one).collect();
+        let leaves: Vec<Extents> = extents.chunks(WIDE).map(joined).collect();
+        let mut levels = vec![by_eights(&extents, slabs.0.len())];
+        let mut groups = leaves.clone();
+        while groups.len() > 1 {
+            levels.push(by_eights(&groups, slabs.0.len()));
+            groups = groups.chunks(WIDE).map(joined).collect();
         }
-        tree
-    }
-
-    /// The last level's eights, by eights.
-    fn above(&self) -> Vec<Eight> {
-        let (count, below) = (self.slabs.0.len(), &self.levels[self.levels.len() - 1]);
-        let of_group = |group: &[Eight]| {
-            let mut eight = [[NOWHERE; 3 + Slabs::MOST]; WIDE];
-            for (one, directions) in eight.iter_mut().zip(group.chunks(count)) {
-                one.iter_mut().zip(directions).for_each(|(extent, direction)| *extent = direction.all());
-            }
-            (0..count).map(move |direction| Eight::new(&eight, direction))
-        };
-        below.chunks(WIDE * count).flat_map(of_group).collect()
+        Self { slabs, extents, leaves, levels }
     }
 
     /// A bit for each child of a node that overlaps `extents`.
@@ -123,15 +101,22 @@ impl<'a> Tree<'a> {
         }
         bits
     }
+}
 
-    /// Of a whole leaf, or of one triangle in it.
-    fn extents(&self, leaf: usize, of: impl Fn(&Eight) -> [f32; 2]) -> Extents {
-        let count = self.slabs.0.len();
-        let mut extents = [NOWHERE; 3 + Slabs::MOST];
-        let directions = &self.levels[0][leaf * count..(leaf + 1) * count];
-        extents.iter_mut().zip(directions).for_each(|(extent, direction)| *extent = of(direction));
-        extents
+/// Every eight of them along each direction.
+fn by_eights(extents: &[Extents], directions: usize) -> Vec<Eight> {
+    let groups = extents.par_chunks(WIDE).with_min_len(RUN);
+    groups.flat_map_iter(|group| (0..directions).map(|direction| Eight::new(group, direction))).collect()
+}
+
+fn joined(group: &[Extents]) -> Extents {
+    let mut all = group[0];
+    for one in &group[1..] {
+        for (all, one) in all.iter_mut().zip(one) {
+            *all = [all[0].min(one[0]), all[1].max(one[1])];
+        }
     }
+    all
 }
 
 fn extents(slabs: &Slabs, corners: [Vec3; 3]) -> Extents {
@@ -146,21 +131,29 @@ fn extents(slabs: &Slabs, corners: [Vec3; 3]) -> Extents {
     extents
 }
 
-/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other.
+/// Triangles of which no two intersect, as is known already.
+pub(super) type Cleared<'a> = dyn Fn(u32) -> bool + Sync + 'a;
+
+/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other. Pairs of two
+/// `cleared` ones are not looked for.
 pub(super) fn intersecting_pairs_of(
     places: &[Vec3],
     triangles: &[[u32; 3]],
     among: &[u32],
+    cleared: &Cleared<'_>,
     slabs: &Slabs,
 ) -> Vec<[u32; 2]> {
     if among.is_empty() {
         return Vec::new();
     }
-    let search = Search { places, triangles, among, tree: Tree::new(slabs, places, triangles, among) };
+    let fresh = fresh(among, cleared);
+    if fresh[fresh.len() - 1][0] == 0 {
+        return Vec::new();
+    }
+    let search = Search { places, triangles, among, tree: Tree::new(slabs, places, triangles, among), fresh };
     let of_leaf = |leaf: usize| {
         let mut pairs = Vec::new();
-        let extents = search.tree.extents(leaf, Eight::all);
-        search.descend(search.tree.levels.len() - 1, 0, leaf, &extents, &mut pairs);
+        search.descend(search.tree.levels.len() - 1, 0, leaf, &search.tree.leaves[leaf], &mut pairs);
         pairs
     };
     let leaves = among.len().div_ceil(WIDE);
@@ -175,12 +168,18 @@ struct Search<'a> {
     triangles: &'a [[u32; 3]],
     among: &'a [u32],
     tree: Tree<'a>,
+    /// Of every node: a bit for each child with triangles that are not cleared.
+    fresh: Vec<Vec<u32>>,
 }
 
 impl Search<'_> {
     /// Compares the triangles of leaf `own`, which lie within `extents`, with those under a node that do not come before it.
     fn descend(&self, level: usize, node: usize, own: usize, extents: &Extents, pairs: &mut Vec<[u32; 2]>) {
-        let near = self.tree.overlapping(level, node, extents);
+        let worth = if self.fresh[0][own] == 0 { self.fresh[level][node] } else { !0 };
+        if worth == 0 {
+            return;
+        }
+        let near = worth & self.tree.overlapping(level, node, extents);
         if level == 0 {
             return self.compare(own, node, near, pairs);
         }
@@ -196,11 +195,12 @@ impl Search<'_> {
         let group = &self.among[own * WIDE..self.among.len().min((own + 1) * WIDE)];
         for (i, &a) in group.iter().enumerate() {
             let later = if own == other { near & (!1 << i) } else { near };
+            let is_fresh = self.fresh[0][own] >> i & 1 == 1;
+            let later = if is_fresh { later } else { later & self.fresh[0][other] };
             if later == 0 {
                 continue;
             }
-            let extents = self.tree.extents(own, |eight| eight.one(i));
-            for k in ones(later & self.tree.overlapping(0, other, &extents)) {
+            for k in ones(later & self.tree.overlapping(0, other, &self.tree.extents[own * WIDE + i])) {
                 let b = self.among[other * WIDE + k];
                 if self.intersect(a, b) {
                     pairs.push([a.min(b), a.max(b)]);
@@ -221,6 +221,18 @@ impl Search<'_> {
         }
         (0..3).any(|k| passes(s[k], s[(k + 1) % 3], &t) || passes(t[k], t[(k + 1) % 3], &s))
     }
+}
+
+/// Level by level, a bit for each child of a node that has triangles that are not cleared.
+fn fresh(among: &[u32], cleared: &Cleared<'_>) -> Vec<Vec<u32>> {
+    let bits = |eight: &[bool]| eight.iter().enumerate().fold(0, |bits, (k, &is)| bits | u32::from(is) << k);
+    let mut below: Vec<bool> = among.iter().map(|&t| !cleared(t)).collect();
+    let mut levels: Vec<Vec<u32>> = vec![below.chunks(WIDE).map(bits).collect()];
+    while levels[levels.len() - 1].len() > 1 {
+        below = levels[levels.len() - 1].iter().map(|&bits| bits != 0).collect();
+        levels.push(below.chunks(WIDE).map(bits).collect());
+    }
+    levels
 }
 
 /// Which bits are set.

@@ -1,6 +1,6 @@
 //! The part of lattice and surface that a set of active joints solves for, with indices of its own.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
@@ -60,6 +60,8 @@ pub(super) struct Region {
     pub(super) hung: Vec<Hung>,
     /// Members of each active joint with local indices, the free ones: nodes first, as everywhere.
     pub(super) free: Vec<Vec<Member>>,
+    /// Six times the volume of each joint's region at rest, once asked for.
+    pub(super) rest_volumes: Vec<OnceLock<f64>>,
     /// The free ones as the kernels take them.
     pub(super) limited: Vec<Limited>,
     /// Those beyond.
@@ -153,6 +155,7 @@ impl Region {
             sides,
             tetrahedra,
             hung: hung.collect(),
+            rest_volumes: free.iter().map(|_| OnceLock::new()).collect(),
             free,
             limited,
             beyond: active.iter().map(|joint| members(&mut joint.beyond())).collect(),

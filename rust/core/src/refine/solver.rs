@@ -6,6 +6,7 @@ use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::{Axis, HalfSpace};
+use super::contact::Suspects;
 use super::coupling::{carry_lattice, carry_skin, place};
 use super::crease::{Crease, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
@@ -21,6 +22,8 @@ use super::skeleton::Path;
 
 /// Most steps of a frame.
 const MOST_STEPS: usize = 24;
+/// What rounding may add to an angle, in steps: 120 degrees are four of 30.
+const ROUNDING: f64 = 1e-3;
 /// Iterations in all where something twists: dual quaternions pinch a wrist that only twists, whatever else bends a little.
 const TWIST_ITERATIONS: usize = 10;
 /// Twist from which that many are taken, radians.
@@ -37,6 +40,8 @@ const PASSES: usize = 2;
 const HARM: f64 = 0.1;
 /// How far, in cells, skin that has come through skin is moved back.
 pub(super) const FARTHEST: f32 = 1.5;
+/// What has moved by less, in cells, has stayed: rounding alone moves it by as much.
+const STILL: f32 = 3e-5;
 
 /// Times of the stages, by name, in the order they first ran.
 #[derive(Default)]
@@ -60,6 +65,8 @@ pub(super) struct Solution {
     /// Surface vertices that the solver moved, and their places in cells.
     pub(super) moved: Vec<(u32, Vec3)>,
     pub(super) report: Report,
+    /// Triangles of the surface of which no two intersect that do not at rest.
+    pub(super) cleared: Vec<u32>,
     /// Across which triangles are told apart.
     pub(super) slabs: Slabs,
 }
@@ -85,16 +92,16 @@ pub(super) fn solve(
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
     if active.is_empty() {
-        return Solution { moved: Vec::new(), report: Report::default(), slabs: Slabs::new([]) };
+        return Solution { moved: Vec::new(), report: Report::default(), cleared: Vec::new(), slabs: Slabs::new([]) };
     }
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let slabs = slabs(&active, pose);
     let membranes = active.iter().map(|_| None).collect();
-    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
+    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
-    Solution { moved: frame.moved(), report, slabs: frame.slabs }
+    Solution { moved: frame.moved(), report, cleared: frame.cleared(), slabs: frame.slabs }
 }
 
 /// Across the planes of the joints that bend most.
@@ -116,7 +123,7 @@ pub(super) fn measure(
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
     let (slabs, membranes) = (Slabs::new([]), Vec::new());
-    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -143,6 +150,8 @@ pub(super) struct Frame<'a> {
     slabs: Slabs,
     /// Of every joint with skin in contact, for the iterations of one step.
     membranes: Vec<Option<Membrane>>,
+    /// Whether it is known that no triangles of the region intersect that do not at rest.
+    is_clear: bool,
 }
 
 impl Frame<'_> {
@@ -154,7 +163,7 @@ impl Frame<'_> {
     fn walk(&mut self, path: &Path<'_>, quality: Quality) {
         let swing = self.active.iter().map(|active| f64::from(active.swing)).fold(0.0, f64::max);
         let bends = swing > 1f64.to_radians();
-        let steps = if bends { ((swing / quality.sub_angle()).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
+        let steps = if bends { ((swing / quality.sub_angle() - ROUNDING).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
         let twists = !bends || self.active.iter().any(|active| f64::from(active.twist) > TWISTS);
         let least = if twists { TWIST_ITERATIONS.div_ceil(steps) } else { 0 };
         let iterations = quality.iterations().max(least);
@@ -286,34 +295,45 @@ impl Frame<'_> {
                 );
             });
         }
-        let (mut parted, mut left) = clock.time("contact", || self.part(&suspects));
+        let (mut parted, mut left, mut lost) = (Vec::new(), 0, Vec::new());
+        let mut cleared = Vec::new();
         for _ in 0..quality.balloons() {
-            clock.time("balloon", || {
-                (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
+            lost = clock.time("balloon", || {
+                let lost = (0..self.active.len()).map(|k| self.inflate(k, &axes[k], pose, &parted)).collect();
                 self.inflate_whole(&axes, pose, skin, &parted);
+                lost
             });
-            let (more, pairs) = clock.time("contact", || self.part(&suspects));
+            let (more, pairs) = clock.time("contact", || self.part(&suspects, &cleared));
             left = pairs;
             if more.is_empty() {
                 break;
             }
+            // What does not move from here on is known to be clear of each other.
+            cleared = if left == 0 { self.places() } else { Vec::new() };
             parted.extend(more);
         }
         if self.prepared.surface.islands > 1 && self.settings.self_collision {
             left = clock.time("contact", || self.pairs(&self.places()).len());
         }
-        clock.time("contact", || self.undo_harm(pose, &axes, left));
+        self.is_clear = left == 0 && suspects.len() == self.local.triangles.len();
+        clock.time("contact", || self.undo_harm(pose, &axes, &lost, left));
         self.clock = clock;
     }
 
     /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
     /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
-    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
+    /// `missing` is the share of each joint's volume that balloons could not restore.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], missing: &[f64], left: usize) {
         let all = 0..self.active.len();
         let lost =
             |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
+        let may_harm = |&k: &usize| left > 0 || missing[k].is_nan() || missing[k].abs() > HARM / 2.0;
+        let doubtful: Vec<usize> = all.clone().filter(may_harm).collect();
+        if doubtful.is_empty() {
+            return;
+        }
         let solved = self.places();
-        let suspects: Vec<usize> = all.clone().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
+        let suspects: Vec<usize> = doubtful.into_iter().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
         if suspects.is_empty() && left == 0 {
             return;
         }
@@ -356,6 +376,7 @@ impl Frame<'_> {
 
     /// Puts a joint's skin where skinning has it.
     fn give_back(&mut self, k: usize, skin: &[Vec3]) {
+        self.is_clear = false;
         let Local { region, particles, .. } = &mut self.local;
         for member in region.free[k].iter().chain(&region.beyond[k]) {
             let particle = &mut particles[member.particle as usize];
@@ -375,12 +396,16 @@ impl Frame<'_> {
     }
 
     /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
-    fn part(&mut self, suspects: &[u32]) -> (Vec<u32>, usize) {
+    /// `cleared` are places at which no triangles of the region intersected, if there are any.
+    fn part(&mut self, suspects: &[u32], cleared: &[Vec3]) -> (Vec<u32>, usize) {
         if !self.settings.self_collision {
             return (Vec::new(), 0);
         }
-        let mut places = self.places();
-        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST, &self.slabs);
+        let (mut places, region) = (self.places(), &*self.local.region);
+        let stays: Vec<bool> = cleared.iter().zip(&places).map(|(a, b)| (a - b).abs().max_element() < STILL).collect();
+        let is_cleared = |t: u32| !stays.is_empty() && region.triangles[t as usize].iter().all(|&p| stays[p as usize]);
+        let among = Suspects { triangles: suspects, cleared: &is_cleared };
+        let (moved, left) = self.prepared.contact.part(region, &mut places, among, FARTHEST, &self.slabs);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
@@ -388,9 +413,10 @@ impl Frame<'_> {
         (moved, left)
     }
 
-    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
+    /// Restores the volume of joint `k`; returns the share that is missing then.
+    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) -> f64 {
         if self.settings.volume == 0.0 {
-            return;
+            return f64::NAN;
         }
         let joint = self.active[k].joint;
         let mut contacts = self.contacts(k, axis);
@@ -399,14 +425,16 @@ impl Frame<'_> {
         let balloon = Balloon::new(&self.local, &self.local.region.free[k], &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let (kernel, limits) = (self.kernel, self.limits(k, axis, 1.0));
-        balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
+        let missing = balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
             local.limit_skin(kernel, k, limits);
         });
+        if target == 0.0 { 0.0 } else { missing / target }
     }
 
     fn rest_volume(&self, balloon: &Balloon, k: usize) -> f64 {
         let rest = |p: u32| self.prepared.rest[self.local.global[p as usize] as usize];
-        balloon.volume(self.active[k].joint.axis.origin, rest)
+        let volume = || balloon.volume(self.active[k].joint.axis.origin, rest);
+        *self.local.region.rest_volumes[k].get_or_init(volume)
     }
 
     /// By how much the bones' own scale changes the joint's volume.
@@ -453,6 +481,10 @@ impl Frame<'_> {
         let (volume_after, bulge_after) = self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
         let (angle, is_limb) = (path.angle(joint.bone), joint.is_limb);
         JointReport { bone: joint.bone, angle, volume_before, volume_after, bulge_before, bulge_after, is_limb }
+    }
+
+    fn cleared(&self) -> Vec<u32> {
+        if self.is_clear { self.local.region.triangle_names.clone() } else { Vec::new() }
     }
 
     /// Surface vertices of the whole that this frame placed: free ones, and those bound near a limb's joint.
