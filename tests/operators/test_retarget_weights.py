@@ -3,11 +3,13 @@
 import json
 
 import builders
+import figure
 import numpy as np
 import pytest
 from limbs import ARM, error_of, limb, truth
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+bmesh = pytest.importorskip("bmesh", reason="needs the bpy wheel")
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
@@ -100,6 +102,47 @@ def test_locked_groups_and_other_groups_stay(man, child):
     assert retarget(child[1]) == {"FINISHED"}
     rows = builders.dense(obj, ["pin", "Hand.L"])
     assert np.allclose(rows, (0.3, 0.25))
+
+
+def shaped_by_a_key(obj):
+    """The mesh itself is half as long, and a shape key in use makes it what it was."""
+    obj.shape_key_add(name="Basis")
+    real = obj.shape_key_add(name="Real")
+    real.value = 1
+    for points in (obj.data.vertices, obj.data.shape_keys.reference_key.data):
+        for point in points:
+            point.co.z *= 0.5
+
+
+@pytest.mark.parametrize("who", ["source", "target"])
+def test_the_shape_that_is_shown_counts(man, child, who):
+    expected = [truth(obj, 2.0) for obj in child[1]]
+    for obj in child[1] if who == "target" else [o for o in bpy.data.objects if o.name.startswith("Man ")]:
+        if obj.type == "MESH":
+            shaped_by_a_key(obj)
+    assert retarget(child[1], vertex_order=False) == {"FINISHED"}
+    for obj, rows in zip(child[1], expected, strict=True):
+        assert np.abs(builders.dense(obj, ARM) - rows).sum(1).mean() / 2 < 0.05
+
+
+def test_half_a_source_under_mirror_gives_as_the_whole_one(scene):
+    body = figure.body()
+    other = figure.body()
+    expected = builders.dense(other, figure.BONES)
+    other.vertex_groups.clear()
+    rig = body.modifiers[0].object
+    for obj in (other, other.modifiers[0].object):
+        obj.location.x += 3
+    edited = bmesh.new()
+    edited.from_mesh(body.data)
+    bmesh.ops.delete(edited, geom=[vertex for vertex in edited.verts if vertex.co.x < -1e-4], context="VERTS")
+    edited.to_mesh(body.data)
+    body.modifiers.new("Half", "MIRROR")
+    body.modifiers.move(1, 0)
+    scene.skinwright.retarget.source = rig
+    assert retarget([other], vertex_order=False) == {"FINISHED"}
+    error = np.abs(builders.dense(other, figure.BONES) - expected).sum(1) / 2
+    assert error.mean() < 0.01 and error.max() < 0.2
 
 
 @pytest.mark.parametrize("locked", [ARM[:1], ARM[1:], ARM])
