@@ -261,6 +261,18 @@ def test_the_shape_that_is_shown_is_refined(addon, tmp_path, fatter):
     np.testing.assert_allclose(shown(obj), expected, atol=1e-3)
 
 
+def test_animated_shape_keys_are_named(addon, tmp_path):
+    obj, rig = tube()
+    bent(rig)
+    fatter_by_key(obj)
+    bake = {"filepath": str(tmp_path / "a.pc2"), "frame_start": 1, "frame_end": 1}
+    bpy.ops.skinwright.bake_refined_cache(**bake)
+    assert not addon.reporting.last.warnings
+    obj.data.shape_keys.key_blocks["Fat"].keyframe_insert("value", frame=1)
+    bpy.ops.skinwright.bake_refined_cache(**bake)
+    assert "Limb has animated shape keys" in addon.reporting.last.warnings[0]
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.1])
 def test_a_mesh_that_is_inside_out_is_refined_as_the_right_one(addon, scale):
     """Of size 1 the lattice of such a mesh was a few cells, and of 1.1 there was none."""
