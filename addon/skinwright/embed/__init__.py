@@ -102,7 +102,7 @@ def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
 def _donor(
     context: bpy.types.Context, source: bpy.types.Object, bones: RestBones
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], Rows]:
-    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups]
+    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(
             f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "

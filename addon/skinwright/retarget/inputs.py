@@ -109,7 +109,7 @@ def _source(context: bpy.types.Context, source: bpy.types.Object) -> Character:
     rig = source if source.type == "ARMATURE" else armature.find(source)
     if rig is None:
         raise SceneError(f"{source.name} has no armature: pick the source's armature, or give it an Armature modifier")
-    meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups]
+    meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(f"{rig.name} deforms no mesh that has weights: pick the armature of a skinned character")
     return _character(rig, meshes)
@@ -175,6 +175,8 @@ def _landmarks(source: Character, target: Character, params: RetargetParams) -> 
 def _vertex(character: Character, name: str, vertex: int) -> int:
     place = landmarks.place_of_empty(name)
     if place is not None:
+        if not np.isfinite(place).all():
+            raise SceneError(f"The landmark {name} is nowhere: give it a location of numbers")
         return int(np.linalg.norm(character.positions - place, axis=1).argmin())
     for obj, start, end in zip(character.meshes, character.starts, character.starts[1:], strict=False):
         if obj.name == name:
