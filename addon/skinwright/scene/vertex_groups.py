@@ -68,7 +68,10 @@ def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], na
     indices = [index.get(_stored(name), -1) for name in names]
     if all(i < 0 for i in indices):
         return csr.empty(n)
-    held = _memberships(mesh, np.arange(n, dtype=np.int64))
+    everything = np.arange(n, dtype=np.int64)
+    if len(names) == 1 and (array := deform_array.open_array(mesh, everything)):
+        return _read_one(obj, names, array, indices[0])
+    held = _memberships(mesh, everything)
     column = _lookup(indices, held.group)
     keep = column >= 0
     vertex, column, values = held.row[keep], column[keep], held.values[keep]
@@ -76,6 +79,17 @@ def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], na
     order = np.argsort(vertex * len(names) + column, kind="stable")
     indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
+
+
+def _read_one(obj: bpy.types.Object, names: Sequence[str], array: deform_array.DeformArray, index: int) -> Rows:
+    """The same for one group, which a stroke of a brush waits for: other groups' weights are not touched."""
+    entry = np.flatnonzero(array.groups() == index)
+    vertex = np.searchsorted(array.indptr, entry, side="right") - 1
+    values = array.memory["weight"][array.entries[entry]]
+    column = np.zeros(len(entry), np.int64)
+    _check_finite(obj, names, vertex, column, values)
+    indptr = np.searchsorted(entry, array.indptr)
+    return Rows(indptr.astype(np.uint32), column.astype(np.uint32), values)
 
 
 def values(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:

@@ -96,11 +96,16 @@ class Prepared:
         return self._own(self._inpainting.confidence(mask=self._spread([mask]), **self._settings | thresholds))
 
     def start(
-        self, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, max_influences: int
+        self,
+        masks: Sequence[NDArray[np.uint8] | None],
+        params: TransferParams,
+        max_influences: int,
+        near: bool = False,
     ) -> native.Job:
-        """Solve on threads of Rust's own; a mask (V,) or None for each target."""
+        """Solve on threads of Rust's own; a mask (V,) or None for each target. With `near` only around what the masks
+        have changed since the last solve, if that can be: `report["solved_near"]` tells."""
         settings = self._keywords(params) | {"max_influences": max_influences}
-        return self._inpainting.start(mask=self._spread(masks), **settings)
+        return self._inpainting.start(mask=self._spread(masks), near=near, **settings)
 
     def _keywords(self, params: TransferParams) -> dict[str, Any]:
         """The settings of a solve."""

@@ -1,16 +1,14 @@
 //! The volume of the whole body, where hips and shoulders meet: the ends of their regions do not move rigidly, so that what
 //! each of them is measured to enclose misses what is lost between them.
 
-use std::sync::Arc;
-
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
 use super::coupling::place;
-use super::crease::{bind_skin, within};
+use super::crease::within;
 use super::joints::Member;
-use super::solver::{Frame, IN_CONTACT, KEPT};
+use super::solver::{Frame, KEPT};
 
 /// Share of the body's volume that may be missing.
 const TOLERATED: f64 = 0.01;
@@ -24,8 +22,7 @@ impl Frame<'_> {
     /// is where dual quaternions have the mesh' vertices (mesh units).
     pub(super) fn inflate_whole(&mut self, axes: &[Axis], pose: &[DAffine3], skin: &[[f32; 3]], parted: &[u32]) {
         let trunk: Vec<usize> = (0..self.active.len()).filter(|&k| !self.active[k].joint.is_limb).collect();
-        let is_rigid = (0..self.active.len()).all(|k| (self.growth(k, pose) - 1.0).abs() < RIGID);
-        if self.settings.volume == 0.0 || trunk.is_empty() || !is_rigid || !self.prepared.surface.is_closed {
+        if self.settings.volume == 0.0 || trunk.is_empty() || !self.has_whole(pose) {
             return;
         }
         let (missing, whole) = self.missing(skin);
@@ -39,19 +36,18 @@ impl Frame<'_> {
         let first = self.active[trunk[0]].joint;
         let now = balloon.volume(axes[trunk[0]].origin, |p| place(&self.local.particles[p as usize]));
         let target = now + 6.0 * excess.clamp(-MOST * whole, MOST * whole);
-        let limbs: Vec<usize> = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb).collect();
-        let (region, bind) = (Arc::clone(&self.local.region), self.settings.bind as f32);
-        let creases: Vec<_> = limbs.iter().map(|&k| self.crease(k, &axes[k], 1.0, &region.free[k])).collect();
+        let limbs = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb);
+        let limits: Vec<_> = limbs.map(|k| (k, self.limits(k, &axes[k], 1.0))).collect();
+        let kernel = self.kernel;
         balloon.inflate(&mut self.local, axes[trunk[0]].origin, target, first.radius, |local| {
-            for (&k, crease) in limbs.iter().zip(&creases) {
-                if bind > 0.0 {
-                    bind_skin(local, &axes[k], &region.free[k], bind);
-                }
-                if let Some(crease) = crease {
-                    crease.separate(local);
-                }
-            }
+            limits.iter().for_each(|&(k, limits)| local.limit_skin(kernel, k, limits));
         });
+    }
+
+    /// Whether the body's volume is known, and that of rest.
+    pub(super) fn has_whole(&self, pose: &[DAffine3]) -> bool {
+        let is_rigid = |k: usize| (self.growth(k, pose) - 1.0).abs() < RIGID;
+        self.prepared.surface.is_closed && (0..self.active.len()).all(is_rigid)
     }
 
     /// The volume that is missing, in cells, and all of it at rest.
@@ -81,12 +77,10 @@ impl Frame<'_> {
         let mut kept = Vec::new();
         for (k, axis) in axes.iter().enumerate() {
             let radius = self.active[k].joint.radius;
-            let crease = self.crease(k, axis, 1.0, &self.local.region.free[k]);
-            let contacts = crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * radius)).unwrap_or_default();
-            kept.extend(within(&self.local, &self.prepared.rest, &contacts, KEPT * radius));
+            kept.extend(within(&self.local, &self.contacts(k, axis), KEPT * radius));
         }
         let radius = self.active.iter().map(|active| active.joint.radius).fold(f32::INFINITY, f32::min);
-        kept.extend(within(&self.local, &self.prepared.rest, parted, KEPT * radius));
+        kept.extend(within(&self.local, parted, KEPT * radius));
         kept
     }
 }
