@@ -384,6 +384,26 @@ def test_objects_of_libraries_may_have_the_same_names(addon, tmp_path):
     bpy.ops.skinwright.live_refine()
 
 
+def test_a_character_of_an_overridden_collection_is_previewed(addon, tmp_path):
+    obj, rig = tube()
+    collection = bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(collection)
+    for part_ in (obj, rig):
+        collection.objects.link(part_)
+        bpy.context.scene.collection.objects.unlink(part_)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
+        here.collections = ["Character"]
+    here.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    limb = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.override_library)
+    builders.select(limb)
+    assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
+    assert part(addon, "scene.preview_object").of("Limb").visible_get() and not limb.visible_get()
+    bpy.ops.skinwright.live_refine()
+    assert limb.visible_get() and part(addon, "scene.preview_object").of("Limb") is None
+
+
 def test_bones_of_the_command_line_are_those_of_the_armature(addon, tmp_path, capsys):
     tube()
     command = addon.headless.command_line.refine
