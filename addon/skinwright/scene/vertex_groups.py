@@ -163,9 +163,18 @@ def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.Vertex
     return groups
 
 
+def check_names(obj: bpy.types.Object, names: Sequence[str]) -> None:
+    """Raise SceneError for a name that a group cannot have."""
+    bad = [name for name in names if not name or "\0" in name or _stored(name) != name]
+    if bad:
+        raise SceneError(
+            f"{obj.name} cannot have a group called {bad[0]!r}: rename it, to {_NAME_BYTES} bytes of text at most"
+        )
+
+
 def _stored(name: str) -> str:
     """The name as Blender stores it."""
-    return name.encode()[:_NAME_BYTES].decode(errors="ignore")
+    return name.encode(errors="ignore")[:_NAME_BYTES].decode(errors="ignore")
 
 
 def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:

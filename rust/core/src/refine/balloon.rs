@@ -28,22 +28,48 @@ pub(super) struct Balloon {
 impl Balloon {
     /// Over the free skin of `members`; `kept` are vertices that stay, as those in contact do.
     pub(super) fn new(local: &Local, members: &[Member], kept: &[u32]) -> Self {
+        let mut balloon = Self::still(local, members);
         let mut weight = vec![0.0f32; local.particles.len()];
-        let vertices: Vec<u32> = members.iter().map(|m| m.particle).filter(|&p| local.is_surface(p)).collect();
-        vertices.iter().for_each(|&p| weight[p as usize] = 1.0);
-        let member = |p: u32| weight[p as usize] > 0.0;
-        let triangles = local.triangles.iter().filter(|t| t.iter().any(|&p| member(p))).copied().collect();
+        balloon.vertices.iter().for_each(|&p| weight[p as usize] = 1.0);
         kept.iter().for_each(|&p| weight[p as usize] = 0.0);
+        balloon.fade(local, &mut weight);
+        balloon.weights = balloon.vertices.iter().map(|&p| weight[p as usize]).collect();
+        balloon
+    }
+
+    /// The same to measure with: nothing of it can move.
+    pub(super) fn still(local: &Local, members: &[Member]) -> Self {
+        let vertices: Vec<u32> = members.iter().map(|m| m.particle).filter(|&p| local.is_surface(p)).collect();
+        let mut is_member = vec![false; local.particles.len()];
+        vertices.iter().for_each(|&p| is_member[p as usize] = true);
+        let triangles = local.triangles.iter().filter(|t| t.iter().any(|&p| is_member[p as usize])).copied().collect();
+        Self { vertices, weights: Vec::new(), triangles }
+    }
+
+    /// Passes of means over the rings. What all of a ring agrees with stays as it is, so that only the borders between weights
+    /// are visited, and one ring more with every pass.
+    fn fade(&self, local: &Local, weight: &mut [f32]) {
+        let mean = |weight: &[f32], p: u32| {
+            let ring = local.ring(p);
+            ring.iter().map(|&n| weight[n as usize]).sum::<f32>() / ring.len().max(1) as f32
+        };
+        let mut is_member = vec![false; local.particles.len()];
+        self.vertices.iter().for_each(|&p| is_member[p as usize] = true);
+        let differs = |p: &u32| local.ring(*p).iter().any(|&n| weight[n as usize] != weight[*p as usize]);
+        let mut border: Vec<u32> = self.vertices.iter().copied().filter(differs).collect();
         for _ in 0..FADING {
-            let faded = |&p: &u32| {
-                let ring = local.ring(p);
-                ring.iter().map(|&n| weight[n as usize]).sum::<f32>() / ring.len().max(1) as f32
-            };
-            let faded: Vec<f32> = vertices.iter().map(faded).collect();
-            vertices.iter().zip(faded).for_each(|(&p, w)| weight[p as usize] = w);
+            let faded: Vec<f32> = border.iter().map(|&p| mean(weight, p)).collect();
+            border.iter().zip(faded).for_each(|(&p, w)| weight[p as usize] = w);
+            border.iter().for_each(|&p| is_member[p as usize] = false);
+            let from = border.len();
+            for k in 0..from {
+                for &n in local.ring(border[k]) {
+                    if std::mem::take(&mut is_member[n as usize]) {
+                        border.push(n);
+                    }
+                }
+            }
         }
-        let weights = vertices.iter().map(|&p| weight[p as usize]).collect();
-        Self { vertices, weights, triangles }
     }
 
     /// Six times the volume between the skin and `apex`. The ends of the region move rigidly about the joint, so that what
@@ -56,7 +82,8 @@ impl Balloon {
         runs.collect::<Vec<f64>>().iter().sum()
     }
 
-    /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round.
+    /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round. Returns what is
+    /// missing then.
     pub(super) fn inflate(
         &self,
         local: &mut Local,
@@ -64,12 +91,12 @@ impl Balloon {
         target: f64,
         radius: f32,
         mut limit: impl FnMut(&mut Local),
-    ) {
+    ) -> f64 {
         let mut normals = vec![Vec3::ZERO; local.particles.len()];
         for round in 0..ROUNDS {
             let missing = target - self.volume(apex, |p| place(&local.particles[p as usize]));
             if missing.abs() < 1e-5 * target.abs() {
-                return;
+                return missing;
             }
             if round % SAME_NORMALS == 0 {
                 self.normals(local, &mut normals);
@@ -82,6 +109,7 @@ impl Balloon {
             }
             limit(local);
         }
+        target - self.volume(apex, |p| place(&local.particles[p as usize]))
     }
 
     /// Sums of the doubled areas around each vertex.

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use glam::Vec3;
 
-use super::pairs::{intersecting_pairs, intersecting_pairs_of};
+use super::pairs::{Cleared, Slabs, intersecting_pairs, intersecting_pairs_of};
 use super::region::Region;
 use super::surface::Surface;
 
@@ -13,7 +13,9 @@ use super::surface::Surface;
 const STALLED: usize = 5;
 /// How many rings around are smoothed, in the order they are tried: a fold is wider than it looks, and skin that is
 /// pressed against what may not move gets worse by smoothing.
-const WIDTHS: [usize; 5] = [1, 0, 2, 3, 4];
+///
+/// One of them smooths and pushes nothing (step 0): it takes more rounds and more volume, but diverges less often.
+const TRIES: [(usize, f32); 6] = [(1, STEP), (3, 0.0), (0, STEP), (2, STEP), (3, STEP), (4, STEP)];
 /// The widest smoothing, as a share of how far skin may move: edges of coarse skin are longer, and a ring of them is a limb.
 const WIDEST: f32 = 1.4;
 /// How far a round pushes, as a share of the mean edge of the triangles in each other.
@@ -27,6 +29,13 @@ const RINGS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct Contact {
     at_rest: HashSet<[u32; 2]>,
+}
+
+/// Triangles among which folds are looked for.
+#[derive(Clone, Copy)]
+pub(super) struct Suspects<'a> {
+    pub(super) triangles: &'a [u32],
+    pub(super) cleared: &'a Cleared<'a>,
 }
 
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
@@ -90,20 +99,35 @@ impl Contact {
     }
 
     /// The pairs of all of the skin's triangles that do not intersect at rest.
-    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3]) -> Vec<[u32; 2]> {
-        self.pairs(skin, places, &(0..skin.triangles().len() as u32).collect::<Vec<_>>())
+    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
+        let all: Vec<u32> = (0..skin.triangles().len() as u32).collect();
+        self.pairs(skin, places, &all, &|_| false, slabs)
     }
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
     /// which is the outer one cannot be told: pushing and smoothing would eat them up.
-    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
-        let mut pairs = self.pairs(skin, places, among);
+    fn own_pairs(
+        &self,
+        skin: &dyn Skin,
+        places: &[Vec3],
+        among: &[u32],
+        cleared: &Cleared<'_>,
+        slabs: &Slabs,
+    ) -> Vec<[u32; 2]> {
+        let mut pairs = self.pairs(skin, places, among, cleared, slabs);
         pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
         pairs
     }
 
-    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: &[u32]) -> Vec<[u32; 2]> {
-        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among);
+    fn pairs(
+        &self,
+        skin: &dyn Skin,
+        places: &[Vec3],
+        among: &[u32],
+        cleared: &Cleared<'_>,
+        slabs: &Slabs,
+    ) -> Vec<[u32; 2]> {
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among, cleared, slabs);
         pairs.retain(|&[a, b]| {
             let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
@@ -120,10 +144,11 @@ impl Contact {
         &self,
         skin: &dyn Skin,
         places: &mut Vec<Vec3>,
-        suspects: &[u32],
+        Suspects { triangles: suspects, cleared }: Suspects<'_>,
         farthest: f32,
+        slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
-        let mut pairs = self.own_pairs(skin, places, suspects);
+        let mut pairs = self.own_pairs(skin, places, suspects, cleared, slabs);
         if pairs.is_empty() {
             return (Vec::new(), 0);
         }
@@ -134,16 +159,16 @@ impl Contact {
             .collect();
         let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().max(1.0) as usize;
         let (start, mut moved) = (places.clone(), Vec::new());
-        for rings in WIDTHS.into_iter().filter(|&rings| rings <= most_rings) {
+        for (rings, step) in TRIES.into_iter().filter(|&(rings, _)| rings <= most_rings) {
             let (mut now, mut left, mut stalled) = (places.clone(), pairs.clone(), 0);
             while stalled < STALLED && !pairs.is_empty() {
-                let pushed = push(skin, &mut now, &left, rings);
+                let pushed = push(skin, &mut now, &left, rings, step);
                 for &i in &pushed {
                     let from = start[i as usize];
                     now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
                 }
                 moved.extend(pushed);
-                left = self.own_pairs(skin, &now, &among);
+                left = self.own_pairs(skin, &now, &among, &|_| false, slabs);
                 stalled += 1;
                 if left.len() < pairs.len() {
                     stalled = 0;
@@ -180,7 +205,7 @@ fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
 
 /// One round: the triangles of a pair move apart along the difference of their normals, then they and some `rings` around
 /// are smoothed as many times: a fold that stays is wider than it looks. Returns what moved.
-fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) -> Vec<u32> {
+fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize, step: f32) -> Vec<u32> {
     let triangle = |t: u32| skin.triangles()[t as usize];
     let normal = |t: u32| {
         let [a, b, c] = triangle(t).map(|i| places[i as usize]);
@@ -196,7 +221,7 @@ fn push(skin: &dyn Skin, places: &mut [Vec3], pairs: &[[u32; 2]], rings: usize) 
             }
         }
     }
-    let step = STEP * mean_edge(skin, places, pairs);
+    let step = step * mean_edge(skin, places, pairs);
     for (&i, by) in touched.iter().zip(&pushes).filter(|(i, _)| skin.is_free(**i)) {
         places[i as usize] += by.normalize_or_zero() * step;
     }

@@ -3,7 +3,6 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::joints::Member;
 use super::local::Local;
 use super::projection::Particle;
 
@@ -53,21 +52,6 @@ pub(super) fn carry_lattice(local: &mut Local, before: &[Particle]) {
 
 /// Particles that one task moves.
 const RUN: usize = 2048;
-
-/// Moves each of `members` (ascending) by what `by` says of its place, if it is free.
-pub(super) fn shift_members(particles: &mut [Particle], members: &[Member], by: impl Fn(Vec3, &Member) -> Vec3 + Sync) {
-    let of_run = |(run, particles): (usize, &mut [Particle])| {
-        let first = run * RUN;
-        let from = members.partition_point(|m| (m.particle as usize) < first);
-        let to = members.partition_point(|m| (m.particle as usize) < first + RUN);
-        for member in &members[from..to] {
-            let particle = &mut particles[member.particle as usize - first];
-            let by = by(place(particle), member);
-            shift(particle, by);
-        }
-    };
-    particles.par_chunks_mut(RUN).enumerate().for_each(of_run);
-}
 
 pub(super) fn place(particle: &Particle) -> Vec3 {
     Vec3::new(particle[0], particle[1], particle[2])

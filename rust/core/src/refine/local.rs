@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use super::projection::{Multipliers, Particle};
+use super::projection::{Kernel, Limits, Multipliers, OfNodes, Particle, project};
 use super::region::Region;
 
 /// The changing part of a frame; the region is shared with other frames.
@@ -33,6 +33,17 @@ impl Local {
         self.of_edges.restart();
         self.of_sides.restart();
         self.of_tetrahedra.restart();
+    }
+
+    /// Puts the free skin of joint `k` back within its limits.
+    pub(super) fn limit_skin(&mut self, kernel: Kernel, k: usize, limits: Limits) {
+        project(kernel, limits, &self.region.limited[k].skin, &mut Multipliers::new(0), &mut self.particles);
+    }
+
+    /// Puts the free lattice nodes of joint `k` back on their sides.
+    pub(super) fn limit_nodes(&mut self, kernel: Kernel, k: usize, limits: Limits) {
+        let nodes = &self.region.limited[k].nodes;
+        project(kernel, OfNodes(limits), nodes, &mut Multipliers::new(0), &mut self.particles);
     }
 
     /// Tetrahedra turned inside out.

@@ -14,6 +14,7 @@ mod frame;
 mod joints;
 mod lattice;
 mod local;
+mod membrane;
 mod morton;
 mod node_weights;
 mod number;
@@ -33,6 +34,8 @@ mod whole;
 
 use glam::{DAffine3, Vec3};
 
+use self::contact::Suspects;
+use self::pairs::Slabs;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 pub use self::projection::Kernel;
@@ -174,25 +177,28 @@ impl Refiner {
         }
         if self.settings.self_collision && quality == Quality::Bake {
             let start = std::time::Instant::now();
-            self.part_limbs(&mut positions);
+            self.part_limbs(&mut positions, &solution.cleared, &solution.slabs);
             solution.report.stages.push(("limbs", start.elapsed().as_secs_f64() * 1e3));
         }
         solution.report.stages.insert(0, ("skin", skinned));
         Ok((positions, solution.report))
     }
 
-    /// Limb against limb, limb against torso: over the whole skin, once more.
-    fn part_limbs(&self, positions: &mut [[f32; 3]]) {
+    /// Limb against limb, limb against torso: over the whole skin, but for pairs of the triangles `cleared`.
+    fn part_limbs(&self, positions: &mut [[f32; 3]], cleared: &[u32], slabs: &Slabs) {
         let surface = &self.prepared.surface;
+        let mut is_cleared = vec![false; surface.triangles.len()];
+        cleared.iter().for_each(|&t| is_cleared[t as usize] = true);
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
-        let suspects: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let triangles: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+        let suspects = Suspects { triangles: &triangles, cleared: &|t| is_cleared[t as usize] };
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
-        let before = self.lost(&places);
-        if self.prepared.contact.part(surface, &mut places, &suspects, farthest).0.is_empty() {
+        let before = places.clone();
+        if self.prepared.contact.part(surface, &mut places, suspects, farthest, slabs).0.is_empty() {
             return;
         }
         // Layers of cloth can be smoothed away; they had better pass through each other.
-        if self.lost(&places) > MOST_LOST.max(before + MOST_COST) {
+        if self.lost(&places) > MOST_LOST.max(self.lost(&before) + MOST_COST) {
             return;
         }
         for (position, &welded) in positions.iter_mut().zip(&surface.of_vertex) {

@@ -15,6 +15,8 @@ pub trait Number:
     fn sqrt(self) -> Self;
     /// The lesser of two numbers, neither of which may be NaN.
     fn lesser(self, other: Self) -> Self;
+    /// `yes` where this number is less than the other, else `no`.
+    fn if_less(self, other: Self, yes: Self, no: Self) -> Self;
 }
 
 macro_rules! scalar {
@@ -33,6 +35,11 @@ macro_rules! scalar {
             #[inline(always)]
             fn lesser(self, other: Self) -> Self {
                 if self < other { self } else { other }
+            }
+
+            #[inline(always)]
+            fn if_less(self, other: Self, yes: Self, no: Self) -> Self {
+                if self < other { yes } else { no }
             }
         }
     };
@@ -99,6 +106,14 @@ impl Number for Lanes {
             self.0[lane] = if self.0[lane] < other.0[lane] { self.0[lane] } else { other.0[lane] };
         }
         self
+    }
+
+    #[inline(always)]
+    fn if_less(self, other: Self, mut yes: Self, no: Self) -> Self {
+        for lane in 0..LANES {
+            yes.0[lane] = if self.0[lane] < other.0[lane] { yes.0[lane] } else { no.0[lane] };
+        }
+        yes
     }
 }
 

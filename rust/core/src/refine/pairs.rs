@@ -1,6 +1,6 @@
 //! Pairs of triangles that pass through each other.
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::morton::morton;
@@ -11,6 +11,8 @@ const WIDE: usize = 8;
 const RUN: usize = 16;
 /// Steps of the Morton curve's grid along the longest side.
 const STEPS: f32 = (1 << 20) as f32;
+/// What rounding changes at most in the distance of a point along a direction, as a share of its coordinates.
+const ROUNDING: f32 = 1e-6;
 
 /// Every pair of triangles that intersect and share no corner, each once, ascending.
 pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
@@ -21,55 +23,141 @@ pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec
     let scale = STEPS / (high - low).max_element().max(f32::MIN_POSITIVE);
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     order.sort_by_cached_key(|&t| (morton(((centre(&triangles[t as usize]) - low) * scale).as_ivec3().to_array()), t));
-    intersecting_pairs_of(&places, triangles, &order)
+    intersecting_pairs_of(&places, triangles, &order, &|_| false, &Slabs::new([]))
 }
 
-/// A triangle's box, and its number.
+/// Directions across which triangles are bounded: the axes, and planes that skin is pressed against. It fills boxes that lie
+/// in each other where a plane slants, but only thin slabs along the plane's normal.
+#[derive(Debug, Clone)]
+pub(super) struct Slabs(Vec<Vec3>);
+
+impl Slabs {
+    /// How many normals are worth their tests.
+    const MOST: usize = 5;
+
+    /// Along the axes and the first few of `normals`.
+    pub(super) fn new(normals: impl IntoIterator<Item = Vec3>) -> Self {
+        Self([Vec3::X, Vec3::Y, Vec3::Z].into_iter().chain(normals.into_iter().take(Self::MOST)).collect())
+    }
+}
+
+/// Triangles' extents along each direction of [`Slabs`], by eights, and those of eights by eights again.
+struct Tree<'a> {
+    slabs: &'a Slabs,
+    /// Of each triangle.
+    extents: Vec<Extents>,
+    /// Of each leaf of eight.
+    leaves: Vec<Extents>,
+    levels: Vec<Vec<Eight>>,
+}
+
+/// Extents of eight along one direction, from and to. What is missing in the last ones overlaps nothing.
 #[derive(Clone, Copy)]
-struct Bounds {
-    low: Vec3A,
-    high: Vec3A,
-    triangle: u32,
+struct Eight([[Vec4; 2]; 2]);
+
+/// An extent along each direction.
+type Extents = [[f32; 2]; 3 + Slabs::MOST];
+const NOWHERE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+
+impl Eight {
+    fn new(extents: &[Extents], direction: usize) -> Self {
+        let of = |k: usize| extents.get(k).map_or(NOWHERE, |extents| extents[direction]);
+        let four = |first: usize, end: usize| Vec4::from_array([0, 1, 2, 3].map(|k| of(first + k)[end]));
+        Self([0, 1].map(|end| [four(0, end), four(4, end)]))
+    }
+
+    /// A bit for each that overlaps an extent.
+    fn overlapping(&self, [from, to]: [f32; 2]) -> u32 {
+        let (from, to) = (Vec4::splat(from), Vec4::splat(to));
+        let half = |k: usize| (self.0[0][k].cmple(to) & self.0[1][k].cmpge(from)).bitmask();
+        half(0) | half(1) << 4
+    }
 }
 
-impl Bounds {
-    fn overlaps(&self, other: &Self) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
-    }
-
-    /// Of all of them; the number of the first.
-    fn around(boxes: &[Self]) -> Self {
-        let joined = |a: Self, b: &Self| Self { low: a.low.min(b.low), high: a.high.max(b.high), ..a };
-        boxes[1..].iter().fold(boxes[0], joined)
-    }
-}
-
-/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other.
-///
-/// Boxes are joined by eights, and those by eights again. Each group of eight looks for others that overlap.
-pub(super) fn intersecting_pairs_of(places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Vec<[u32; 2]> {
-    let bounds = |&triangle: &u32| {
-        let [a, b, c] = triangles[triangle as usize].map(|i| Vec3A::from(places[i as usize]));
-        Bounds { low: a.min(b).min(c), high: a.max(b).max(c), triangle }
-    };
-    let mut levels: Vec<Vec<Bounds>> = vec![among.par_iter().with_min_len(RUN * WIDE).map(bounds).collect()];
-    while levels[levels.len() - 1].len() > WIDE {
-        let groups = levels[levels.len() - 1].chunks(WIDE).map(Bounds::around).collect();
-        levels.push(groups);
-    }
-    let search = Search { places, triangles, levels: &levels };
-    let of_group = |group: usize| {
-        let mut pairs = Vec::new();
-        let top = levels.len() - 1;
-        if top == 0 {
-            search.compare(0, 0, &mut pairs);
-        } else {
-            (0..levels[top].len()).for_each(|k| search.descend(top, k, group, &mut pairs));
+impl<'a> Tree<'a> {
+    fn new(slabs: &'a Slabs, places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Self {
+        let of_one = |&t: &u32| extents(slabs, triangles[t as usize].map(|i| places[i as usize]));
+        let extents: Vec<Extents> = among.par_iter().with_min_len(RUN * WIDE).map(of_one).collect();
+        let leaves: Vec<Extents> = extents.chunks(WIDE).map(joined).collect();
+        let mut levels = vec![by_eights(&extents, slabs.0.len())];
+        let mut groups = leaves.clone();
+        while groups.len() > 1 {
+            levels.push(by_eights(&groups, slabs.0.len()));
+            groups = groups.chunks(WIDE).map(joined).collect();
         }
+        Self { slabs, extents, leaves, levels }
+    }
+
+    /// A bit for each child of a node that overlaps `extents`.
+    fn overlapping(&self, level: usize, node: usize, extents: &Extents) -> u32 {
+        let count = self.slabs.0.len();
+        let directions = self.levels[level][node * count..(node + 1) * count].iter().zip(extents);
+        let mut bits = 0xff;
+        for (direction, &extent) in directions {
+            bits &= direction.overlapping(extent);
+            if bits == 0 {
+                break;
+            }
+        }
+        bits
+    }
+}
+
+/// Every eight of them along each direction.
+fn by_eights(extents: &[Extents], directions: usize) -> Vec<Eight> {
+    let groups = extents.par_chunks(WIDE).with_min_len(RUN);
+    groups.flat_map_iter(|group| (0..directions).map(|direction| Eight::new(group, direction))).collect()
+}
+
+fn joined(group: &[Extents]) -> Extents {
+    let mut all = group[0];
+    for one in &group[1..] {
+        for (all, one) in all.iter_mut().zip(one) {
+            *all = [all[0].min(one[0]), all[1].max(one[1])];
+        }
+    }
+    all
+}
+
+fn extents(slabs: &Slabs, corners: [Vec3; 3]) -> Extents {
+    // What rounding may change: no pair that intersects may be lost.
+    let largest = corners.map(Vec3::abs).iter().fold(Vec3::ZERO, |most, &p| most.max(p));
+    let pad = ROUNDING * largest.element_sum();
+    let mut extents = [NOWHERE; 3 + Slabs::MOST];
+    for (extent, direction) in extents.iter_mut().zip(&slabs.0) {
+        let [a, b, c] = corners.map(|p| p.dot(*direction));
+        *extent = [a.min(b).min(c) - pad, a.max(b).max(c) + pad];
+    }
+    extents
+}
+
+/// Triangles of which no two intersect, as is known already.
+pub(super) type Cleared<'a> = dyn Fn(u32) -> bool + Sync + 'a;
+
+/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other. Pairs of two
+/// `cleared` ones are not looked for.
+pub(super) fn intersecting_pairs_of(
+    places: &[Vec3],
+    triangles: &[[u32; 3]],
+    among: &[u32],
+    cleared: &Cleared<'_>,
+    slabs: &Slabs,
+) -> Vec<[u32; 2]> {
+    if among.is_empty() {
+        return Vec::new();
+    }
+    let fresh = fresh(among, cleared);
+    if fresh[fresh.len() - 1][0] == 0 {
+        return Vec::new();
+    }
+    let search = Search { places, triangles, among, tree: Tree::new(slabs, places, triangles, among), fresh };
+    let of_leaf = |leaf: usize| {
+        let mut pairs = Vec::new();
+        search.descend(search.tree.levels.len() - 1, 0, leaf, &search.tree.leaves[leaf], &mut pairs);
         pairs
     };
-    let groups = levels[0].len().div_ceil(WIDE);
-    let found = (0..groups).into_par_iter().with_min_len(RUN).flat_map_iter(of_group);
+    let leaves = among.len().div_ceil(WIDE);
+    let found = (0..leaves).into_par_iter().with_min_len(RUN).flat_map_iter(of_leaf);
     let mut pairs: Vec<[u32; 2]> = found.collect();
     pairs.sort_unstable();
     pairs
@@ -78,34 +166,44 @@ pub(super) fn intersecting_pairs_of(places: &[Vec3], triangles: &[[u32; 3]], amo
 struct Search<'a> {
     places: &'a [Vec3],
     triangles: &'a [[u32; 3]],
-    levels: &'a [Vec<Bounds>],
+    among: &'a [u32],
+    tree: Tree<'a>,
+    /// Of every node: a bit for each child with triangles that are not cleared.
+    fresh: Vec<Vec<u32>>,
 }
 
 impl Search<'_> {
-    /// Compares group `own` of triangles with those under box `k` of a level that do not come before it.
-    fn descend(&self, level: usize, k: usize, own: usize, pairs: &mut Vec<[u32; 2]>) {
-        let last_below = (k + 1) * WIDE.pow(level as u32 - 1) - 1;
-        if last_below < own || !self.levels[1][own].overlaps(&self.levels[level][k]) {
+    /// Compares the triangles of leaf `own`, which lie within `extents`, with those under a node that do not come before it.
+    fn descend(&self, level: usize, node: usize, own: usize, extents: &Extents, pairs: &mut Vec<[u32; 2]>) {
+        let worth = if self.fresh[0][own] == 0 { self.fresh[level][node] } else { !0 };
+        if worth == 0 {
             return;
         }
-        if level == 1 {
-            return self.compare(own, k, pairs);
+        let near = worth & self.tree.overlapping(level, node, extents);
+        if level == 0 {
+            return self.compare(own, node, near, pairs);
         }
-        let end = ((k + 1) * WIDE).min(self.levels[level - 1].len());
-        (k * WIDE..end).for_each(|child| self.descend(level - 1, child, own, pairs));
+        for child in ones(near).map(|k| node * WIDE + k) {
+            if (child + 1) * WIDE.pow(level as u32 - 1) > own {
+                self.descend(level - 1, child, own, extents, pairs);
+            }
+        }
     }
 
-    fn compare(&self, own: usize, other: usize, pairs: &mut Vec<[u32; 2]>) {
-        let boxes = &self.levels[0];
-        let range = |group: usize| group * WIDE..((group + 1) * WIDE).min(boxes.len());
-        for i in range(own) {
-            let (a, from) = (&boxes[i], if own == other { i + 1 } else { 0 });
-            if self.levels.get(1).is_some_and(|groups| !a.overlaps(&groups[other])) {
+    /// Compares the triangles of leaf `own` with those of `near`, bits of another leaf.
+    fn compare(&self, own: usize, other: usize, near: u32, pairs: &mut Vec<[u32; 2]>) {
+        let group = &self.among[own * WIDE..self.among.len().min((own + 1) * WIDE)];
+        for (i, &a) in group.iter().enumerate() {
+            let later = if own == other { near & (!1 << i) } else { near };
+            let is_fresh = self.fresh[0][own] >> i & 1 == 1;
+            let later = if is_fresh { later } else { later & self.fresh[0][other] };
+            if later == 0 {
                 continue;
             }
-            for b in range(other).filter(|&j| j >= from).map(|j| &boxes[j]) {
-                if a.overlaps(b) && self.intersect(a.triangle, b.triangle) {
-                    pairs.push([a.triangle.min(b.triangle), a.triangle.max(b.triangle)]);
+            for k in ones(later & self.tree.overlapping(0, other, &self.tree.extents[own * WIDE + i])) {
+                let b = self.among[other * WIDE + k];
+                if self.intersect(a, b) {
+                    pairs.push([a.min(b), a.max(b)]);
                 }
             }
         }
@@ -113,16 +211,39 @@ impl Search<'_> {
 
     /// Whether an edge of one passes through the inside of the other. Triangles that share a corner never count.
     fn intersect(&self, s: u32, t: u32) -> bool {
-        let (s, t) = (self.triangles[s as usize], self.triangles[t as usize]);
-        if s.iter().any(|i| t.contains(i)) {
+        let ([a, b, c], t) = (self.triangles[s as usize], self.triangles[t as usize]);
+        if t.iter().fold(false, |shared, &i| shared | (i == a) | (i == b) | (i == c)) {
             return false;
         }
-        let [s, t] = [s, t].map(|corners| corners.map(|i| self.places[i as usize].as_dvec3()));
+        let [s, t] = [[a, b, c], t].map(|corners| corners.map(|i| self.places[i as usize].as_dvec3()));
         if on_one_side(&s, &t) || on_one_side(&t, &s) {
             return false;
         }
         (0..3).any(|k| passes(s[k], s[(k + 1) % 3], &t) || passes(t[k], t[(k + 1) % 3], &s))
     }
+}
+
+/// Level by level, a bit for each child of a node that has triangles that are not cleared.
+fn fresh(among: &[u32], cleared: &Cleared<'_>) -> Vec<Vec<u32>> {
+    let bits = |eight: &[bool]| eight.iter().enumerate().fold(0, |bits, (k, &is)| bits | u32::from(is) << k);
+    let mut below: Vec<bool> = among.iter().map(|&t| !cleared(t)).collect();
+    let mut levels: Vec<Vec<u32>> = vec![below.chunks(WIDE).map(bits).collect()];
+    while levels[levels.len() - 1].len() > 1 {
+        below = levels[levels.len() - 1].iter().map(|&bits| bits != 0).collect();
+        levels.push(below.chunks(WIDE).map(bits).collect());
+    }
+    levels
+}
+
+/// Which bits are set.
+fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let k = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            k
+        })
+    })
 }
 
 /// Whether all of one triangle lies strictly on one side of the other's plane, as most neighbours do.

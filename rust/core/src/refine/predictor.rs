@@ -1,6 +1,6 @@
 //! Where particles go with the bones: the start of every step, and the place of what the solver leaves to the skeleton.
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::constraint::{Axis, bind};
@@ -8,7 +8,7 @@ use super::frame::ActiveJoint;
 use super::local::Local;
 use super::prepared::Prepared;
 use super::region::Region;
-use crate::skinning::{DualQuaternion, blended_position};
+use crate::skinning::{DualQuaternion, LEAST_TOTAL_WEIGHT, blended_position};
 
 /// Particles that one task moves.
 const RUN: usize = 512;
@@ -65,7 +65,7 @@ pub(super) fn place_bound(local: &mut Local, active: &[ActiveJoint<'_>], axes: &
 /// Moves free particles by what the bones did since the last step, and puts the others where dual quaternions say.
 pub(super) fn follow(prepared: &Prepared, local: &mut Local, before: &[DAffine3], after: &[DAffine3]) {
     let changes: Vec<DAffine3> = before.iter().zip(after).map(|(b, a)| *a * b.inverse()).collect();
-    let (changes, whole) = (motions(&changes), motions(after));
+    let (changes, whole) = (Motions::new(&changes), Motions::new(after));
     let moved = |(particle, &p): (&mut [f32; 4], &u32)| {
         let (bones, values) = prepared.weights.row(p as usize);
         let (from, motions) = if particle[3] > 0.0 {
@@ -73,9 +73,46 @@ pub(super) fn follow(prepared: &Prepared, local: &mut Local, before: &[DAffine3]
         } else {
             (prepared.rest[p as usize], &whole)
         };
-        let place = blended_position(from.as_dvec3(), bones, values, motions).as_vec3();
-        [particle[0], particle[1], particle[2]] = place.to_array();
+        [particle[0], particle[1], particle[2]] = motions.blended(from, bones, values).to_array();
     };
     let Local { region, particles, .. } = local;
     particles.par_iter_mut().with_min_len(RUN).zip(&region.global).for_each(moved);
+}
+
+/// Motions in single precision, which is enough for the steps of a path (its particles are kept in it), if none scales.
+struct Motions {
+    exact: Vec<DualQuaternion>,
+    rigid: Option<Vec<[Vec4; 2]>>,
+}
+
+impl Motions {
+    fn new(pose: &[DAffine3]) -> Self {
+        let exact = motions(pose);
+        let rigid = exact.iter().map(|motion| motion.rigid_parts().map(|parts| parts.map(|part| part.as_vec4())));
+        Self { rigid: rigid.collect(), exact }
+    }
+
+    /// As [`blended_position`].
+    fn blended(&self, position: Vec3, bones: &[u32], weights: &[f32]) -> Vec3 {
+        let Some(rigid) = &self.rigid else {
+            return blended_position(position.as_dvec3(), bones, weights, &self.exact).as_vec3();
+        };
+        let (mut real, mut dual, mut total) = (Vec4::ZERO, Vec4::ZERO, 0.0);
+        for (&bone, &weight) in bones.iter().zip(weights) {
+            let [motion_real, motion_dual] = rigid[bone as usize];
+            total += weight;
+            // Opposite quaternions are the same rotation: the nearer one to the sum so far.
+            let sign = if motion_real.dot(real) < 0.0 { -weight } else { weight };
+            real += motion_real * sign;
+            dual += motion_dual * sign;
+        }
+        let square = real.length_squared();
+        if f64::from(total) <= LEAST_TOTAL_WEIGHT || square == 0.0 {
+            return position;
+        }
+        let (v, moved) = (real.truncate(), dual.truncate());
+        let turned = v.cross(position) + position * real.w;
+        let by = v.cross(turned) + moved * real.w - v * dual.w + v.cross(moved);
+        position + by * (2.0 / square)
+    }
 }

@@ -1,6 +1,6 @@
 //! The part of lattice and surface that a set of active joints solves for, with indices of its own.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
-use super::projection::{Batch, Blocks};
+use super::projection::{Batch, Blocks, Colouring};
 
 const NONE: u32 = u32::MAX;
 /// Constraints that one task looks at.
@@ -20,6 +20,29 @@ pub(super) struct Hung {
     pub(super) vertex: u32,
     pub(super) nodes: [u32; 4],
     pub(super) shares: [f32; 4],
+}
+
+/// The free particles of a joint with what limits them: skin with its distance from the bones and its side of the plane,
+/// lattice nodes with their side.
+#[derive(Debug)]
+pub(super) struct Limited {
+    pub(super) skin: Batch<1, 2>,
+    pub(super) nodes: Batch<1, 1>,
+}
+
+impl Limited {
+    /// Of `members`, nodes first.
+    fn new(lattice: Blocks, skin: Blocks, members: &[Member], nodes: usize) -> Self {
+        let (of_nodes, of_skin) = members.split_at(members.partition_point(|m| (m.particle as usize) < nodes));
+        let colours = Colouring::single(members.len());
+        let all: Vec<u32> = (0..of_skin.len() as u32).collect();
+        let (node, vertex) = (|k: u32| &of_nodes[k as usize], |k: u32| &of_skin[k as usize]);
+        let sided: Vec<u32> = (0..of_nodes.len() as u32).filter(|&k| node(k).side != 0.0).collect();
+        Self {
+            skin: Batch::new(skin, &colours, &all, |k| [vertex(k).particle], |k| [vertex(k).distance, vertex(k).side]),
+            nodes: Batch::new(lattice, &colours, &sided, |k| [node(k).particle], |k| [node(k).side]),
+        }
+    }
 }
 
 /// Particles and constraints of a frame, as far as they depend on which joints are active and how far they reach.
@@ -37,11 +60,17 @@ pub(super) struct Region {
     pub(super) hung: Vec<Hung>,
     /// Members of each active joint with local indices, the free ones: nodes first, as everywhere.
     pub(super) free: Vec<Vec<Member>>,
+    /// Six times the volume of each joint's region at rest, once asked for.
+    pub(super) rest_volumes: Vec<OnceLock<f64>>,
+    /// The free ones as the kernels take them.
+    pub(super) limited: Vec<Limited>,
     /// Those beyond.
     pub(super) beyond: Vec<Vec<Member>>,
     /// Rings of local surface vertices, whole rings only for free ones.
     ring_starts: Vec<u32>,
     rings: Vec<u32>,
+    /// How far those neighbours are at rest.
+    ring_lengths: Vec<f32>,
     /// Triangles over local particles with a free corner.
     pub(super) triangles: Vec<[u32; 3]>,
     /// Their numbers in the surface.
@@ -114,7 +143,10 @@ impl Region {
             let known = chosen.filter(|m| map(m.particle) != NONE);
             known.map(|m| Member { particle: map(m.particle), ..*m }).collect::<Vec<_>>()
         };
+        let free: Vec<Vec<Member>> = active.iter().map(|joint| members(&mut joint.free())).collect();
+        let limited = free.par_iter().map(|members| Limited::new(lattice, skin, members, nodes)).collect();
         let (ring_starts, rings) = rings(prepared, &global[nodes..], &local);
+        let ring_lengths = lengths(prepared, &global, nodes, &ring_starts, &rings);
         let named = |&t: &u32| prepared.surface.triangles[t as usize].map(|i| map(surface(i)));
         Self {
             nodes,
@@ -123,10 +155,13 @@ impl Region {
             sides,
             tetrahedra,
             hung: hung.collect(),
-            free: active.iter().map(|joint| members(&mut joint.free())).collect(),
+            rest_volumes: free.iter().map(|_| OnceLock::new()).collect(),
+            free,
+            limited,
             beyond: active.iter().map(|joint| members(&mut joint.beyond())).collect(),
             ring_starts,
             rings,
+            ring_lengths,
             triangles: chosen.triangles.iter().map(named).collect(),
             triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island(t)).collect(),
             triangle_names: chosen.triangles,
@@ -138,6 +173,12 @@ impl Region {
     pub(super) fn ring(&self, particle: u32) -> &[u32] {
         let i = particle as usize - self.nodes;
         &self.rings[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
+    }
+
+    /// The distances of those neighbours at rest.
+    pub(super) fn ring_lengths(&self, particle: u32) -> &[f32] {
+        let i = particle as usize - self.nodes;
+        &self.ring_lengths[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
     }
 
     /// Whether a local particle moves freely.
@@ -194,6 +235,16 @@ impl Chosen {
 /// The numbers below `count` that `keep` accepts, ascending.
 fn kept(count: usize, keep: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
     (0..count).into_par_iter().with_min_len(RUN).filter(|&k| keep(k)).map(|k| k as u32).collect()
+}
+
+/// The distance at rest between each surface vertex and each neighbour.
+fn lengths(prepared: &Prepared, global: &[u32], nodes: usize, starts: &[u32], rings: &[u32]) -> Vec<f32> {
+    let rest = |p: usize| prepared.rest[global[p] as usize];
+    let of_vertex = |(i, ends): (usize, &[u32])| {
+        let ring = &rings[ends[0] as usize..ends[1] as usize];
+        ring.iter().map(move |&n| rest(nodes + i).distance(rest(n as usize)))
+    };
+    starts.windows(2).enumerate().flat_map(of_vertex).collect()
 }
 
 fn rings(prepared: &Prepared, vertices: &[u32], local: &[u32]) -> (Vec<u32>, Vec<u32>) {

@@ -1,26 +1,29 @@
 //! One frame: the path from rest in sub-angles, each a few projections and a relaxed crease; then the volume.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
-use super::constraint::Axis;
+use super::constraint::{Axis, HalfSpace};
+use super::contact::Suspects;
 use super::coupling::{carry_lattice, carry_skin, place};
-use super::crease::{Crease, bind_skin, within};
+use super::crease::{Crease, within};
 use super::frame::{ActiveJoint, active_joints, posed_axis};
-use super::joints::Member;
 use super::local::Local;
+use super::membrane::Membrane;
+use super::pairs::Slabs;
 use super::predictor::{follow, linear, place_all, place_bound, skinned};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
-use super::projection::{Flesh, Kernel, Stretch, project, untangle};
+use super::projection::{Flesh, Kernel, Limits, Stretch, project, untangle};
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
 
 /// Most steps of a frame.
 const MOST_STEPS: usize = 24;
+/// What rounding may add to an angle, in steps: 120 degrees are four of 30.
+const ROUNDING: f64 = 1e-3;
 /// Iterations in all where something twists: dual quaternions pinch a wrist that only twists, whatever else bends a little.
 const TWIST_ITERATIONS: usize = 10;
 /// Twist from which that many are taken, radians.
@@ -37,6 +40,8 @@ const PASSES: usize = 2;
 const HARM: f64 = 0.1;
 /// How far, in cells, skin that has come through skin is moved back.
 pub(super) const FARTHEST: f32 = 1.5;
+/// What has moved by less, in cells, has stayed: rounding alone moves it by as much.
+const STILL: f32 = 3e-5;
 
 /// Times of the stages, by name, in the order they first ran.
 #[derive(Default)]
@@ -60,6 +65,10 @@ pub(super) struct Solution {
     /// Surface vertices that the solver moved, and their places in cells.
     pub(super) moved: Vec<(u32, Vec3)>,
     pub(super) report: Report,
+    /// Triangles of the surface of which no two intersect that do not at rest.
+    pub(super) cleared: Vec<u32>,
+    /// Across which triangles are told apart.
+    pub(super) slabs: Slabs,
 }
 
 /// How a frame is solved.
@@ -83,14 +92,23 @@ pub(super) fn solve(
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
     if active.is_empty() {
-        return Solution { moved: Vec::new(), report: Report::default() };
+        return Solution { moved: Vec::new(), report: Report::default(), cleared: Vec::new(), slabs: Slabs::new([]) };
     }
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
-    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
+    let slabs = slabs(&active, pose);
+    let membranes = active.iter().map(|_| None).collect();
+    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
-    Solution { moved: frame.moved(), report }
+    Solution { moved: frame.moved(), report, cleared: frame.cleared(), slabs: frame.slabs }
+}
+
+/// Across the planes of the joints that bend most.
+fn slabs(active: &[ActiveJoint<'_>], pose: &[DAffine3]) -> Slabs {
+    let mut limbs: Vec<&ActiveJoint<'_>> = active.iter().filter(|active| active.joint.is_limb).collect();
+    limbs.sort_by(|a, b| b.swing.total_cmp(&a.swing));
+    Slabs::new(limbs.iter().filter_map(|a| Some(a.plane(&posed_axis(a.joint, pose), 1.0)?.normal)))
 }
 
 /// Volume and bulge of every active joint for skin at given places (welded surface vertices, in cells).
@@ -104,7 +122,8 @@ pub(super) fn measure(
     let active = active_joints(&prepared.joints, &path, pose);
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
-    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0 };
+    let (slabs, membranes) = (Slabs::new([]), Vec::new());
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -125,9 +144,14 @@ pub(super) struct Frame<'a> {
     pub(super) settings: &'a Settings,
     pub(super) active: &'a [ActiveJoint<'a>],
     pub(super) local: Local,
-    kernel: Kernel,
+    pub(super) kernel: Kernel,
     clock: Clock,
     iterations: usize,
+    slabs: Slabs,
+    /// Of every joint with skin in contact, for the iterations of one step.
+    membranes: Vec<Option<Membrane>>,
+    /// Whether it is known that no triangles of the region intersect that do not at rest.
+    is_clear: bool,
 }
 
 impl Frame<'_> {
@@ -139,7 +163,7 @@ impl Frame<'_> {
     fn walk(&mut self, path: &Path<'_>, quality: Quality) {
         let swing = self.active.iter().map(|active| f64::from(active.swing)).fold(0.0, f64::max);
         let bends = swing > 1f64.to_radians();
-        let steps = if bends { ((swing / quality.sub_angle()).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
+        let steps = if bends { ((swing / quality.sub_angle() - ROUNDING).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
         let twists = !bends || self.active.iter().any(|active| f64::from(active.twist) > TWISTS);
         let least = if twists { TWIST_ITERATIONS.div_ceil(steps) } else { 0 };
         let iterations = quality.iterations().max(least);
@@ -156,6 +180,7 @@ impl Frame<'_> {
             });
             self.clock = clock;
             self.local.restart();
+            self.membranes.fill_with(|| None);
             for iteration in 1..=iterations {
                 self.iterate(&axes, share as f32, quality == Quality::Bake || iteration == iterations);
             }
@@ -171,7 +196,7 @@ impl Frame<'_> {
         clock.time("couple", || carry_skin(&mut self.local, &before, REJOIN));
         let skin = self.local.particles[nodes..].to_vec();
         clock.time("project", || self.project_surface());
-        clock.time("crease", || _ = self.limit(axes, share, PASSES));
+        clock.time("crease", || self.limit(axes, share, PASSES));
         clock.time("couple", || carry_lattice(&mut self.local, &skin));
         clock.time("crease", || self.separate(axes, share));
         self.iterations += 1;
@@ -201,49 +226,59 @@ impl Frame<'_> {
         }
     }
 
-    /// Bind, planes and membranes of every joint. Returns the skin of the membranes.
-    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) -> Vec<u32> {
-        let mut membranes = Vec::new();
-        for (k, active) in self.active.iter().enumerate() {
-            let region = Arc::clone(&self.local.region);
-            let members = &region.free[k];
-            if self.settings.bind > 0.0 && active.joint.is_limb {
-                bind_skin(&mut self.local, &axes[k], members, self.settings.bind as f32);
-            }
-            if let Some(crease) = self.crease(k, &axes[k], share, members) {
-                crease.separate(&mut self.local);
-                membranes.extend(crease.relax(&mut self.local, &self.prepared.rest, passes));
+    /// Bind, planes and membranes of every joint.
+    fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
+        for (k, axis) in axes.iter().enumerate() {
+            let limits = self.limits(k, axis, share);
+            self.local.limit_nodes(self.kernel, k, limits);
+            self.local.limit_skin(self.kernel, k, limits);
+            if let Some(plane) = self.plane(k, axis, share) {
+                if self.membranes[k].is_none() {
+                    self.membranes[k] = self.crease(k, axis, plane).membrane(&self.local);
+                }
+                if let Some(membrane) = &mut self.membranes[k] {
+                    membrane.relax(&mut self.local, &plane, passes);
+                }
             }
         }
-        membranes
     }
 
-    /// Planes alone.
+    /// Planes alone, which the lattice may have left when it followed its skin.
     fn separate(&mut self, axes: &[Axis], share: f32) {
-        for k in 0..self.active.len() {
-            let region = Arc::clone(&self.local.region);
-            let members = &region.free[k];
-            if let Some(crease) = self.crease(k, &axes[k], share, members) {
-                crease.separate(&mut self.local);
-            }
+        for (k, axis) in axes.iter().enumerate() {
+            let limits = self.limits(k, axis, share);
+            self.local.limit_nodes(self.kernel, k, limits);
         }
     }
 
-    pub(super) fn crease<'m>(&self, k: usize, axis: &Axis, share: f32, members: &'m [Member]) -> Option<Crease<'m>> {
-        if !self.settings.self_collision {
-            return None;
-        }
-        let plane = self.active[k].plane(axis, share)?;
-        Some(Crease { axis: *axis, plane, radius: self.active[k].joint.radius, members })
+    /// What the particles of joint `k` may not leave.
+    pub(super) fn limits(&self, k: usize, axis: &Axis, share: f32) -> Limits {
+        let most = if self.active[k].joint.is_limb { self.settings.bind as f32 } else { 0.0 };
+        Limits::new(axis, self.plane(k, axis, share).as_ref(), most)
+    }
+
+    fn plane(&self, k: usize, axis: &Axis, share: f32) -> Option<HalfSpace> {
+        if self.settings.self_collision { self.active[k].plane(axis, share) } else { None }
+    }
+
+    fn crease(&self, k: usize, axis: &Axis, plane: HalfSpace) -> Crease<'_> {
+        Crease { axis: *axis, plane, radius: self.active[k].joint.radius, members: &self.local.region.free[k] }
+    }
+
+    /// Skin in contact when a joint has come all the way.
+    pub(super) fn contacts(&self, k: usize, axis: &Axis) -> Vec<u32> {
+        let Some(plane) = self.plane(k, axis, 1.0) else { return Vec::new() };
+        self.crease(k, axis, plane).contacts(&self.local, IN_CONTACT * self.active[k].joint.radius)
     }
 
     /// The last passes over the creases, and the volume.
     fn finish(&mut self, pose: &[DAffine3], skin: &[[f32; 3]], quality: Quality) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
-        let membranes = clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
+        self.membranes.fill_with(|| None);
+        clock.time("crease", || self.limit(&axes, 1.0, quality.final_passes()));
         let suspects = match quality {
-            Quality::Live => self.triangles_of(membranes),
+            Quality::Live => self.triangles_that_may_fold(),
             Quality::Bake => (0..self.local.triangles.len() as u32).collect(),
         };
         if self.settings.volume > 0.0 {
@@ -260,34 +295,45 @@ impl Frame<'_> {
                 );
             });
         }
-        let (mut parted, mut left) = clock.time("contact", || self.part(&suspects));
+        let (mut parted, mut left, mut lost) = (Vec::new(), 0, Vec::new());
+        let mut cleared = Vec::new();
         for _ in 0..quality.balloons() {
-            clock.time("balloon", || {
-                (0..self.active.len()).for_each(|k| self.inflate(k, &axes[k], pose, &parted));
+            lost = clock.time("balloon", || {
+                let lost = (0..self.active.len()).map(|k| self.inflate(k, &axes[k], pose, &parted)).collect();
                 self.inflate_whole(&axes, pose, skin, &parted);
+                lost
             });
-            let (more, pairs) = clock.time("contact", || self.part(&suspects));
+            let (more, pairs) = clock.time("contact", || self.part(&suspects, &cleared));
             left = pairs;
             if more.is_empty() {
                 break;
             }
+            // What does not move from here on is known to be clear of each other.
+            cleared = if left == 0 { self.places() } else { Vec::new() };
             parted.extend(more);
         }
         if self.prepared.surface.islands > 1 && self.settings.self_collision {
             left = clock.time("contact", || self.pairs(&self.places()).len());
         }
-        clock.time("contact", || self.undo_harm(pose, &axes, left));
+        self.is_clear = left == 0 && suspects.len() == self.local.triangles.len();
+        clock.time("contact", || self.undo_harm(pose, &axes, &lost, left));
         self.clock = clock;
     }
 
     /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
     /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
-    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], left: usize) {
+    /// `missing` is the share of each joint's volume that balloons could not restore.
+    fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], missing: &[f64], left: usize) {
         let all = 0..self.active.len();
         let lost =
             |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
+        let may_harm = |&k: &usize| left > 0 || missing[k].is_nan() || missing[k].abs() > HARM / 2.0;
+        let doubtful: Vec<usize> = all.clone().filter(may_harm).collect();
+        if doubtful.is_empty() {
+            return;
+        }
         let solved = self.places();
-        let suspects: Vec<usize> = all.clone().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
+        let suspects: Vec<usize> = doubtful.into_iter().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
         if suspects.is_empty() && left == 0 {
             return;
         }
@@ -325,11 +371,12 @@ impl Frame<'_> {
 
     /// The pairs of the region's triangles that pass through each other, but for those that do at rest.
     fn pairs(&self, places: &[Vec3]) -> Vec<[u32; 2]> {
-        self.prepared.contact.all_pairs(&*self.local.region, places)
+        self.prepared.contact.all_pairs(&*self.local.region, places, &self.slabs)
     }
 
     /// Puts a joint's skin where skinning has it.
     fn give_back(&mut self, k: usize, skin: &[Vec3]) {
+        self.is_clear = false;
         let Local { region, particles, .. } = &mut self.local;
         for member in region.free[k].iter().chain(&region.beyond[k]) {
             let particle = &mut particles[member.particle as usize];
@@ -338,9 +385,10 @@ impl Frame<'_> {
     }
 
     /// The triangles that may fold: those of the membranes, and all of joints that have none.
-    fn triangles_of(&self, membranes: Vec<u32>) -> Vec<u32> {
+    fn triangles_that_may_fold(&self) -> Vec<u32> {
         let mut may_fold = vec![false; self.local.particles.len()];
         let bare = self.active.iter().zip(&self.local.free).filter(|(active, _)| !active.joint.is_limb);
+        let membranes = self.membranes.iter().flatten().flat_map(Membrane::vertices).copied();
         let particles = bare.flat_map(|(_, members)| members).map(|member| member.particle).chain(membranes);
         particles.for_each(|p| may_fold[p as usize] = true);
         let count = self.local.triangles.len() as u32;
@@ -348,12 +396,16 @@ impl Frame<'_> {
     }
 
     /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
-    fn part(&mut self, suspects: &[u32]) -> (Vec<u32>, usize) {
+    /// `cleared` are places at which no triangles of the region intersected, if there are any.
+    fn part(&mut self, suspects: &[u32], cleared: &[Vec3]) -> (Vec<u32>, usize) {
         if !self.settings.self_collision {
             return (Vec::new(), 0);
         }
-        let mut places = self.places();
-        let (moved, left) = self.prepared.contact.part(&*self.local.region, &mut places, suspects, FARTHEST);
+        let (mut places, region) = (self.places(), &*self.local.region);
+        let stays: Vec<bool> = cleared.iter().zip(&places).map(|(a, b)| (a - b).abs().max_element() < STILL).collect();
+        let is_cleared = |t: u32| !stays.is_empty() && region.triangles[t as usize].iter().all(|&p| stays[p as usize]);
+        let among = Suspects { triangles: suspects, cleared: &is_cleared };
+        let (moved, left) = self.prepared.contact.part(region, &mut places, among, FARTHEST, &self.slabs);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();
@@ -361,37 +413,30 @@ impl Frame<'_> {
         (moved, left)
     }
 
-    /// Restores the volume about a limb's joint. Elsewhere the ends of the region hardly move rigidly about it, so that the
-    /// body's whole volume decides if it is known; beside a chest not at all.
-    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) {
+    /// Restores the volume about a limb's joint; returns the share that is missing then. Elsewhere the ends of the region
+    /// hardly move rigidly about it, so that the body's whole volume decides if it is known; beside a chest not at all.
+    fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) -> f64 {
         let joint = self.active[k].joint;
         let is_measured = joint.is_limb || joint.is_slim && !self.has_whole(pose);
         if self.settings.volume == 0.0 || !is_measured {
-            return;
+            return f64::NAN;
         }
-        let region = Arc::clone(&self.local.region);
-        let members = &region.free[k];
-        let crease = self.crease(k, axis, 1.0, members);
-        let mut contacts =
-            crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * joint.radius)).unwrap_or_default();
+        let mut contacts = self.contacts(k, axis);
         contacts.extend(parted);
-        let kept = within(&self.local, &self.prepared.rest, &contacts, KEPT * joint.radius);
-        let balloon = Balloon::new(&self.local, members, &kept);
+        let kept = within(&self.local, &contacts, KEPT * joint.radius);
+        let balloon = Balloon::new(&self.local, &self.local.region.free[k], &kept);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
-        let most = if joint.is_limb { self.settings.bind as f32 } else { 0.0 };
-        balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
-            if most > 0.0 {
-                bind_skin(local, axis, members, most);
-            }
-            if let Some(crease) = crease {
-                crease.separate(local);
-            }
+        let (kernel, limits) = (self.kernel, self.limits(k, axis, 1.0));
+        let missing = balloon.inflate(&mut self.local, axis.origin, target, joint.radius, |local| {
+            local.limit_skin(kernel, k, limits);
         });
+        if target == 0.0 { 0.0 } else { missing / target }
     }
 
     fn rest_volume(&self, balloon: &Balloon, k: usize) -> f64 {
         let rest = |p: u32| self.prepared.rest[self.local.global[p as usize] as usize];
-        balloon.volume(self.active[k].joint.axis.origin, rest)
+        let volume = || balloon.volume(self.active[k].joint.axis.origin, rest);
+        *self.local.region.rest_volumes[k].get_or_init(volume)
     }
 
     /// By how much the bones' own scale changes the joint's volume.
@@ -424,7 +469,7 @@ impl Frame<'_> {
     /// Volume of a joint's region against rest, and the farthest that its skin is from the bones against rest.
     fn measure(&self, k: usize, pose: &[DAffine3], axis: &Axis, at: &(dyn Fn(u32) -> Vec3 + Sync)) -> (f64, f64) {
         let (joint, members) = (self.active[k].joint, &self.local.free[k]);
-        let balloon = Balloon::new(&self.local, members, &[]);
+        let balloon = Balloon::still(&self.local, members);
         let target = self.rest_volume(&balloon, k) * self.growth(k, pose);
         let volume = balloon.volume(axis.origin, at);
         let skin = members.iter().filter(|m| self.local.is_surface(m.particle) && m.distance > 0.2 * joint.radius);
@@ -438,6 +483,10 @@ impl Frame<'_> {
         let (volume_after, bulge_after) = self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
         let (angle, is_limb) = (path.angle(joint.bone), joint.is_limb);
         JointReport { bone: joint.bone, angle, volume_before, volume_after, bulge_before, bulge_after, is_limb }
+    }
+
+    fn cleared(&self) -> Vec<u32> {
+        if self.is_clear { self.local.region.triangle_names.clone() } else { Vec::new() }
     }
 
     /// Surface vertices of the whole that this frame placed: free ones, and those bound near a limb's joint.

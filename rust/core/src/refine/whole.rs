@@ -1,16 +1,14 @@
 //! The volume of the whole body, where hips and shoulders meet: the ends of their regions do not move rigidly, so that what
 //! each of them is measured to enclose misses what is lost between them.
 
-use std::sync::Arc;
-
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
 use super::coupling::place;
-use super::crease::{bind_skin, within};
+use super::crease::within;
 use super::joints::Member;
-use super::solver::{Frame, IN_CONTACT, KEPT};
+use super::solver::{Frame, KEPT};
 
 /// Share of the body's volume that may be missing.
 const TOLERATED: f64 = 0.01;
@@ -38,18 +36,11 @@ impl Frame<'_> {
         let first = self.active[trunk[0]].joint;
         let now = balloon.volume(axes[trunk[0]].origin, |p| place(&self.local.particles[p as usize]));
         let target = now + 6.0 * excess.clamp(-MOST * whole, MOST * whole);
-        let limbs: Vec<usize> = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb).collect();
-        let (region, bind) = (Arc::clone(&self.local.region), self.settings.bind as f32);
-        let creases: Vec<_> = limbs.iter().map(|&k| self.crease(k, &axes[k], 1.0, &region.free[k])).collect();
+        let limbs = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb);
+        let limits: Vec<_> = limbs.map(|k| (k, self.limits(k, &axes[k], 1.0))).collect();
+        let kernel = self.kernel;
         balloon.inflate(&mut self.local, axes[trunk[0]].origin, target, first.radius, |local| {
-            for (&k, crease) in limbs.iter().zip(&creases) {
-                if bind > 0.0 {
-                    bind_skin(local, &axes[k], &region.free[k], bind);
-                }
-                if let Some(crease) = crease {
-                    crease.separate(local);
-                }
-            }
+            limits.iter().for_each(|&(k, limits)| local.limit_skin(kernel, k, limits));
         });
     }
 
@@ -86,12 +77,10 @@ impl Frame<'_> {
         let mut kept = Vec::new();
         for (k, axis) in axes.iter().enumerate() {
             let radius = self.active[k].joint.radius;
-            let crease = self.crease(k, axis, 1.0, &self.local.region.free[k]);
-            let contacts = crease.map(|crease| crease.contacts(&self.local, IN_CONTACT * radius)).unwrap_or_default();
-            kept.extend(within(&self.local, &self.prepared.rest, &contacts, KEPT * radius));
+            kept.extend(within(&self.local, &self.contacts(k, axis), KEPT * radius));
         }
         let radius = self.active.iter().map(|active| active.joint.radius).fold(f32::INFINITY, f32::min);
-        kept.extend(within(&self.local, &self.prepared.rest, parted, KEPT * radius));
+        kept.extend(within(&self.local, parted, KEPT * radius));
         kept
     }
 }

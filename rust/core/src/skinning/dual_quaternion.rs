@@ -48,6 +48,11 @@ impl DualQuaternion {
         let real = DVec4::from(rotation);
         Self { real, dual: dual_part(translation, real), scale }
     }
+
+    /// The real and the dual part, if there is no scale.
+    pub(crate) fn rigid_parts(&self) -> Option<[DVec4; 2]> {
+        self.scale.is_none().then_some([self.real, self.dual])
+    }
 }
 
 /// Half the product of a translation and a rotation (x, y, z, w).

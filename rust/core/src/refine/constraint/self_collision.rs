@@ -14,6 +14,27 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
+    /// Heights that hold for what the plane does not concern.
+    pub const ANYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+    /// Lowest and highest that a point may be above the plane; skin that lies in it at rest stays between the two sides.
+    pub fn heights(&self, side: f32) -> [f32; 2] {
+        if side > 0.0 {
+            [self.gap, f32::INFINITY]
+        } else if side < 0.0 {
+            [f32::NEG_INFINITY, -self.gap]
+        } else {
+            [-self.gap / 2.0, self.gap / 2.0]
+        }
+    }
+
+    /// The move that brings a point to these heights, if it is not there.
+    pub fn back(&self, point: Vec3, [lowest, highest]: [f32; 2]) -> Vec3 {
+        let height = (point - self.origin).dot(self.normal);
+        // Not `clamp`: it panics without an order between the two, as a pose that is not a number leaves it.
+        self.normal * (height.max(lowest).min(highest) - height)
+    }
+
     /// How far inside of its half `point` lies, negative beyond the plane; `side` is +1 for the child's, -1 for the
     /// parent's, 0 for what lies in the plane.
     pub fn depth(&self, point: Vec3, side: f32) -> f32 {

@@ -10,6 +10,11 @@ pub(super) const NONE: u8 = u8::MAX;
 pub struct Colouring(pub(super) Vec<u8>);
 
 impl Colouring {
+    /// Of constraints over one particle each, all different.
+    pub fn single(count: usize) -> Self {
+        Self(vec![0; count])
+    }
+
     /// Greedy: each constraint in turn gets the smallest colour that none of its particles has.
     pub fn new<const N: usize>(constraints: &[[u32; N]], particle_count: usize) -> Self {
         let mut taken = vec![0u128; particle_count];

@@ -65,6 +65,23 @@ impl Kind<4, 0, 0> for Fill {
     }
 }
 
+/// What lies below zero of a measure of `N` particles.
+pub(super) trait Measure<const N: usize>: Copy + Send + Sync {
+    /// The measure.
+    fn of<T: Number>(self, places: [Vector<T>; N], any: T) -> T;
+}
+
+/// By how much tetrahedra have more than this volume.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Thin(pub(super) f32);
+
+impl Measure<4> for Thin {
+    #[inline(always)]
+    fn of<T: Number>(self, places: [Vector<T>; 4], any: T) -> T {
+        volume(places, any.constant(self.0)).value
+    }
+}
+
 #[inline(always)]
 fn apply<T: Number, const N: usize>(
     constraint: Constraint<T, N>,

@@ -9,6 +9,8 @@ mod batch;
 mod blocks;
 mod colouring;
 mod kind;
+mod limit;
+mod look;
 mod register;
 mod untangle;
 #[cfg(target_arch = "x86_64")]
@@ -18,6 +20,7 @@ pub use self::batch::{Batch, Multipliers, Particle};
 pub use self::blocks::Blocks;
 pub use self::colouring::Colouring;
 pub use self::kind::{Flesh, Kind, Stretch};
+pub use self::limit::{Limits, OfNodes};
 use self::register::Register;
 pub use self::untangle::untangle;
 use super::number::{LANES, Lanes};

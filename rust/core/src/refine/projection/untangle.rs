@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::super::constraint::volume;
 use super::batch::{Batch, Multipliers, Particle};
-use super::kind::Fill;
+use super::kind::{Fill, Thin};
+use super::look::look;
 use super::{Kernel, project};
 
 /// Tetrahedra that one task looks at.
@@ -24,7 +24,7 @@ pub fn untangle(
     rounds: usize,
 ) {
     for _ in 0..rounds {
-        let thin = batch.subset(&thin(batch, particles, least * at_rest));
+        let thin = batch.subset(&thin(kernel, batch, particles, least * at_rest));
         if thin.is_empty() {
             return;
         }
@@ -35,18 +35,12 @@ pub fn untangle(
 }
 
 /// The tetrahedra with a volume of less than `least`, ascending.
-fn thin(batch: &Batch<4, 0>, particles: &[Particle], least: f32) -> Vec<u32> {
-    let [a, b, c, d] = &batch.particles;
+fn thin(kernel: Kernel, batch: &Batch<4, 0>, particles: &[Particle], least: f32) -> Vec<u32> {
     let of_run = |run: usize| {
-        let of_one = |k: usize| {
-            let places = [a[k], b[k], c[k], d[k]].map(|p| {
-                let [x, y, z, _] = particles[p as usize];
-                [x, y, z]
-            });
-            volume(places, least).value
-        };
-        let end = ((run + 1) * RUN).min(batch.len());
-        (run * RUN..end).filter(|&k| of_one(k) < 0.0).map(|k| k as u32).collect::<Vec<_>>()
+        let (from, to) = (run * RUN, ((run + 1) * RUN).min(batch.len()));
+        let mut thin = Vec::new();
+        look(kernel, Thin(least), batch, from..to, particles, |k| thin.push(k as u32));
+        thin
     };
     (0..batch.len().div_ceil(RUN)).into_par_iter().flat_map_iter(of_run).collect()
 }

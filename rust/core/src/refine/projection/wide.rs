@@ -61,6 +61,12 @@ impl Number for Wide {
     fn lesser(self, other: Self) -> Self {
         Self { value: self.simd.min_f32s(self.value, other.value), ..self }
     }
+
+    #[inline(always)]
+    fn if_less(self, other: Self, yes: Self, no: Self) -> Self {
+        let is_less = self.simd.less_than_f32s(self.value, other.value);
+        Self { value: self.simd.select_f32s(is_less, yes.value, no.value), ..self }
+    }
 }
 
 impl Register for Wide {
