@@ -295,8 +295,12 @@ impl Frame<'_> {
                 );
             });
         }
-        let (mut parted, mut left, mut lost) = (Vec::new(), 0, Vec::new());
-        let mut cleared = Vec::new();
+        let (mut parted, mut left, mut lost, mut cleared) = (Vec::new(), 0, Vec::new(), Vec::new());
+        // Planes leave few folds, and balloons none more. Hips have no planes: what parting costs there is restored.
+        if self.active.iter().any(|active| !active.joint.is_limb) {
+            (parted, left) = clock.time("contact", || self.part(&suspects, &[]));
+            cleared = if left == 0 { self.places() } else { Vec::new() };
+        }
         for _ in 0..quality.balloons() {
             lost = clock.time("balloon", || {
                 let lost = (0..self.active.len()).map(|k| self.inflate(k, &axes[k], pose, &parted)).collect();
