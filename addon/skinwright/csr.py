@@ -1,5 +1,6 @@
 """Arithmetic on CSR weight rows (indptr, bones, values); numpy only."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +80,17 @@ def beside(left: Rows, n_columns: int, right: Rows) -> Rows:
     bones = np.concatenate([left.bones, right.bones + np.uint32(n_columns)])
     values = np.concatenate([left.values, right.values])
     return Rows(left.indptr + right.indptr, bones[order], values[order])
+
+
+def concatenated(parts: Sequence[Rows]) -> Rows:
+    """The rows of all parts, at least one, one after another."""
+    offsets = np.cumsum([0, *(len(part.bones) for part in parts)], dtype=np.int64)
+    indptr = [part.indptr[1:] + np.uint32(start) for part, start in zip(parts, offsets, strict=False)]
+    return Rows(
+        np.concatenate([np.zeros(1, np.uint32), *indptr]),
+        np.concatenate([part.bones for part in parts]),
+        np.concatenate([part.values for part in parts]),
+    )
 
 
 def take_rows(rows: Rows, indices: NDArray[np.integer]) -> Rows:

@@ -74,10 +74,10 @@ class Runner:
         return self.done
 
     def wait(self, seconds: float) -> None:
-        """Give the present job this long to end."""
+        """Give the present job this long to end, with a few looks at it."""
         end = time.perf_counter() + seconds
         while self._job and not self._job.done and time.perf_counter() < end:
-            time.sleep(0.001)
+            time.sleep(max(0.001, 0.25 * seconds))
 
     def cancel(self) -> None:
         """Stop without the steps that are left."""

@@ -109,13 +109,15 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class SkinnedMesh:
-    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it."""
+    """What automatic weights did to a mesh; `outside` lists bones no part of which lies inside of it, `notes` are
+    sentences on what else concerns the object."""
 
     target: str
     armature: str
     vertices: int
     bones: int
     outside: list[str]
+    notes: list[str] = field(default_factory=list)
 
     def sentence(self) -> str:
         """The line the artist reads."""
@@ -123,10 +125,11 @@ class SkinnedMesh:
 
     def warnings(self) -> list[str]:
         """What is worth a look."""
-        if not self.outside:
-            return []
-        named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
-        return [f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}"]
+        found = list(self.notes)
+        if self.outside:
+            named = ", ".join(self.outside[:5]) + (", ..." if len(self.outside) > 5 else "")
+            found.append(f"{self.target}: {len(self.outside)} bones lie outside of the mesh: {named}")
+        return found
 
 
 @dataclass(frozen=True)

@@ -68,3 +68,22 @@ def test_thresholds_may_change_after_preparing():
         kept = prepared.solve(**settings)
         np.testing.assert_array_equal(kept.weights.values, fresh.weights.values)
         np.testing.assert_array_equal(kept.distance, fresh.distance)
+
+
+@pytest.mark.parametrize("method", ["paper", "confidence"])
+@pytest.mark.parametrize("flipped", [True, False])
+def test_a_source_whose_faces_are_there_twice_is_the_same_source(method, flipped):
+    """Once to each side, on the same vertices, as single-sided engines want it: no vertex loses its normal."""
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, 6), np.linspace(-1, 1, 6)))
+    positions, k = np.stack([x, y, 0 * x], 1), np.array([i * 6 + j for i in range(5) for j in range(5)])
+    faces = np.vstack([np.stack([k, k + 1, k + 7], 1), np.stack([k, k + 7, k + 6], 1)])
+    rows = native.Weights.from_dense(np.stack([(x + 1) / 2, (1 - x) / 2], 1).astype(np.float32))
+    garment = positions * 0.9 + (0, 0, 0.02)
+    found = []
+    for triangles in (faces, np.vstack([faces, faces[:, ::-1]])):
+        done = native.Source(positions, triangles, rows).transfer(
+            garment, faces, method=method, match_flipped_normals=flipped
+        )
+        assert done.matched.all()
+        found.append(done.weights.to_dense())
+    np.testing.assert_array_equal(*found)

@@ -179,3 +179,23 @@ def test_counts_of_the_other_operations(native, call, name, value):
 def test_lengths_and_shares_of_the_other_operations(native, call, name, value):
     with pytest.raises(native.InvalidParameter, match=name):
         call(native, **{name: value})
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_numbers_that_are_not_finite_are_no_answer(native, bad):
+    """Depths of 0 would say that nothing is wrong."""
+    weights, pose = native.Weights.from_dense(np.ones((8, 1), np.float32)), np.eye(4)[None]
+    broken = BOX.copy()
+    broken[3, 1] = bad
+    for body, garment in ((broken, BOX), (BOX, broken)):
+        with pytest.raises(native.InvalidMesh, match="not finite at vertex 3"):
+            native.penetration(body, SIDES, weights, garment, weights, pose)
+    with pytest.raises(native.InvalidMesh, match="not finite at vertex 3"):
+        two = native.Weights.from_dense(np.tile(np.float32([0.5, 0.5]), (8, 1)))
+        native.Refiner(broken, SIDES, two, [-1, 0], SEGMENTS)
+    arguments = {"h": np.eye(3)[None], "g": np.ones((1, 3)), "start": np.full((1, 3), 1 / 3)}
+    for name, value in arguments.items():
+        with pytest.raises(native.InvalidParameter, match=f"{name} has a number that is not finite"):
+            native.simplex_qp(
+                **(arguments | {name: np.where(np.arange(value.size).reshape(value.shape) == 2, bad, value)})
+            )

@@ -313,3 +313,26 @@ def test_the_command_does_the_same(addon, legs, rig, tmp_path, capsys):
     assert addon.headless.command_line.main(["autoskin", "--target", "Nobody"]) == 1
     assert addon.headless.command_line.main(["autoskin", "--target", "Legs", "--armature", "Legs"]) == 1
     assert "Legs is no armature" in capsys.readouterr().err
+
+
+def test_one_mesh_is_not_two_targets(addon, legs, rig):
+    twin = bpy.data.objects.new("Twin", legs.data)
+    bpy.context.scene.collection.objects.link(twin)
+    builders.select(legs, twin, rig)
+    with pytest.raises(RuntimeError, match="share one mesh and so its weights"):
+        bpy.ops.skinwright.automatic_weights(resolution=32)
+    assert not legs.vertex_groups and not legs.modifiers and not twin.modifiers
+    run(legs, rig, resolution=32)
+    assert "Legs shares its mesh with Twin, whose weights changed too" in addon.reporting.last.warnings
+
+
+def test_what_keeps_the_weights_from_moving_the_mesh_is_named(addon, legs, rig):
+    other = figure.rig()
+    legs.modifiers.new("Armature", "ARMATURE").object = other
+    run(legs, rig, resolution=32)
+    assert any(f"is deformed by {other.name} and not by {rig.name}" in text for text in addon.reporting.last.warnings)
+    legs.modifiers.clear()
+    legs.parent, legs.parent_type, legs.parent_bone = rig, "BONE", "Hips"
+    legs.matrix_parent_inverse = (rig.matrix_world @ rig.pose.bones["Hips"].matrix).inverted()
+    run(legs, rig, resolution=32)
+    assert any("is parented to the bone Hips of" in text for text in addon.reporting.last.warnings)

@@ -219,6 +219,18 @@ class TestInThisProcess:
         error = capsys.readouterr().err
         assert "--settings" in error and "Traceback" not in error
 
+    def test_a_byte_order_mark_does_not_matter(self, transfer, coat, tmp_path):
+        """Windows' own editor writes one."""
+        path, report = tmp_path / "settings.json", tmp_path / "report.json"
+        path.write_text('{"max_influences": 1}', encoding="utf-8-sig")
+        assert transfer("--source", "Body", "--target", "Coat", "--settings", path, "--report", report) == 0
+        assert json.loads(report.read_text())["settings"]["max_influences"] == 1
+
+    def test_a_target_named_twice_is_one(self, transfer, coat, tmp_path):
+        report = tmp_path / "report.json"
+        assert transfer("--source", "Body", "--target", "Coat", "--target", "Coat", "--report", report) == 0
+        assert len(json.loads(report.read_text())["garments"]) == 1
+
     def test_every_setting_is_an_argument_too(self, transfer, coat, tmp_path):
         report = tmp_path / "report.json"
         arguments = ["--max-influences", 1, "--max-normal-angle", 20, "--match-flipped-normals", "false"]

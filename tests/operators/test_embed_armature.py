@@ -96,6 +96,22 @@ def test_refusals_are_sentences_and_make_nothing(man):
     with pytest.raises(RuntimeError, match="Child has a coordinate that is not a number at vertex 3"):
         bpy.ops.skinwright.embed_armature()
     bpy.data.objects.remove(child)
+    point = builders.mesh("Point", [(0, 0, 0)] * 3, [(0, 1, 2)])
+    builders.select(point)
+    for method in ("TEMPLATE", "MEDIAL"):
+        with pytest.raises(RuntimeError, match="All vertices of Point lie at one place"):
+            bpy.ops.skinwright.embed_armature(method=method)
+    bpy.data.objects.remove(point)
+    man_body = bpy.data.objects["Man"]
+    before = [tuple(vertex.co) for vertex in man_body.data.vertices]
+    for vertex in man_body.data.vertices:
+        vertex.co = (0, 0, 0)
+    builders.select(bare("Child", 0.6))
+    with pytest.raises(RuntimeError, match="All vertices of Man lie at one place"):
+        bpy.ops.skinwright.embed_armature()
+    for vertex, place in zip(man_body.data.vertices, before, strict=True):
+        vertex.co = place
+    bpy.data.objects.remove(bpy.data.objects["Child"])
     bpy.data.objects["Man"].vertex_groups.clear()
     builders.select(bare("Child", 0.6))
     with pytest.raises(RuntimeError, match="deforms no mesh that has weights"):

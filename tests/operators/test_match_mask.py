@@ -1,5 +1,6 @@
 """The match on show, the mask's edits, and painting without a window."""
 
+import time
 from importlib import import_module
 
 import builders
@@ -201,8 +202,6 @@ class TestPainting:
         for _ in range(2000):
             if painting.tick(params(), True):
                 return
-            import time
-
             time.sleep(0.002)
         raise AssertionError("nothing was solved")
 
@@ -263,6 +262,69 @@ class TestPainting:
         assert "Coat" in painting.problem
         after = builders.weights(coat)
         assert [row["Arm.L"] for row in after] == [row["Arm.L"] for row in before]
+        painting.restore()
+
+
+class TestStrokesOnALargeTarget:
+    """Answered with the rows around them first, and with those of the whole once the brush rests."""
+
+    @pytest.fixture
+    def painting(self, scene, native, monkeypatch):
+        scene.skinwright.transfer.source = builders.body()
+        self.sheet = builders.grid("Sheet", 212, size=1.6, z=0.05)
+        builders.select(self.sheet)
+        module = import_module(f"{PACKAGE}.match.painting")
+        monkeypatch.setattr(module, "PATIENCE_SECONDS", 60.0)
+        monkeypatch.setattr(module, "REST_SECONDS", 0.0)
+        painting = module.MaskPainting(bpy.context, self.sheet, params())
+        painting.open(bpy.context)
+        self.stroke(painting, [])
+        assert painting.unsettled is None, "the first solve is one of the whole"
+        return painting
+
+    def stroke(self, painting, vertices):
+        self.sheet.vertex_groups["Match Mask"].add(vertices, 0.0, "REPLACE")
+        painting.expect_stroke()
+        assert painting.tick(params(), True)
+
+    def assert_as_a_transfer(self):
+        """The rows in the file are those of a transfer with the same mask."""
+        painted = builders.dense(self.sheet, ("Arm.L", "Arm.R"))
+        transfer = import_module(f"{PACKAGE}.transfer").transfer_weights
+        transfer(bpy.context, bpy.context.scene.skinwright.transfer.source, [self.sheet], params())
+        assert (painted == builders.dense(self.sheet, ("Arm.L", "Arm.R"))).all()
+
+    def test_rest_brings_the_whole(self, painting):
+        before = builders.dense(self.sheet, ("Arm.L", "Arm.R"))
+        self.stroke(painting, [row * 212 + column for row in range(20) for column in range(20)])
+        assert painting.unsettled is not None
+        near = builders.dense(self.sheet, ("Arm.L", "Arm.R"))
+        assert 0 < (near != before).any(axis=1).sum() < 20_000
+        for _ in range(20_000):
+            if painting.tick(params(), True):
+                break
+            time.sleep(0.001)
+        assert painting.unsettled is None
+        assert len(painting.seconds) == 2, "the whole is not another stroke"
+        assert np.abs(near - builders.dense(self.sheet, ("Arm.L", "Arm.R"))).max() < 5e-3
+        painting.finish()
+        self.assert_as_a_transfer()
+
+    @pytest.mark.parametrize("end", ["finish", "settle"])
+    def test_the_end_brings_the_whole(self, painting, end):
+        self.stroke(painting, list(range(0, 2120, 212)))
+        self.stroke(painting, list(range(1, 2120, 212)))
+        assert painting.unsettled is not None
+        getattr(painting, end)()
+        assert painting.unsettled is None
+        self.assert_as_a_transfer()
+
+    def test_the_next_stroke_does_not_wait_for_the_whole(self, painting):
+        self.stroke(painting, list(range(0, 2120, 212)))
+        painting.tick(params(), True)
+        painting.expect_stroke()
+        assert painting.unsettled is not None
+        assert not painting.session.solving
         painting.restore()
 
 

@@ -226,6 +226,77 @@ def key_offsets(obj, name):
     return (values[0] - values[1]).reshape(-1, 3)
 
 
+def bent(rig, frames=((1, 0), (4, 110))):
+    """Bend the limb over these frames."""
+    for frame, degrees in frames:
+        turn(rig, (1, 0, 0), degrees)
+        rig.pose.bones["Lower"].keyframe_insert("rotation_quaternion", frame=frame)
+
+
+def fatter_by_key(obj):
+    obj.shape_key_add(name="Basis")
+    fat = obj.shape_key_add(name="Fat")
+    for point in fat.data:
+        point.co.y *= 1.3
+        point.co.z *= 1.3
+    fat.value = 1
+
+
+def fatter_by_modifier(obj):
+    obj.modifiers.new("Fat", "DISPLACE").strength = 0.08
+    obj.modifiers.move(1, 0)
+
+
+@pytest.mark.parametrize("fatter", [fatter_by_key, fatter_by_modifier])
+def test_the_shape_that_is_shown_is_refined(addon, tmp_path, fatter):
+    obj, rig = tube()
+    bent(rig)
+    fatter(obj)
+    bpy.context.scene.frame_set(1)
+    expected = shown(obj)
+    bpy.ops.skinwright.live_refine()
+    np.testing.assert_allclose(shown(part(addon, "scene.preview_object").of("Limb")), expected, atol=1e-3)
+    bpy.ops.skinwright.live_refine()
+    bpy.ops.skinwright.bake_refined_cache(filepath=str(tmp_path / "a.pc2"), frame_start=1, frame_end=4)
+    np.testing.assert_allclose(shown(obj), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.1])
+def test_a_mesh_that_is_inside_out_is_refined_as_the_right_one(addon, scale):
+    """Of size 1 the lattice of such a mesh was a few cells, and of 1.1 there was none."""
+    obj, rig = tube()
+    for vertex in obj.data.vertices:
+        vertex.co *= scale
+    turn(rig, (1, 0, 0), 90)
+    found = []
+    for _ in range(2):
+        refiner, pose = solver(addon, obj)
+        found.append(refiner.solve(pose(), quality="live"))
+        obj.data.flip_normals()
+    np.testing.assert_allclose(*found, atol=0.01)  # its quads are cut along the other diagonals
+
+
+@pytest.mark.parametrize("kind", ["SOLIDIFY", "MASK", "WELD", "SCREW", "MIRROR"])
+def test_a_cache_that_could_not_be_played_is_refused(tmp_path, kind):
+    obj, rig = tube()
+    bent(rig)
+    obj.modifiers.new("First", kind)
+    obj.modifiers.move(1, 0)
+    path = tmp_path / "a.pc2"
+    with pytest.raises(RuntimeError, match="Limb has .*First before its armature"):
+        bpy.ops.skinwright.bake_refined_cache(filepath=str(path), frame_start=1, frame_end=2)
+    assert not path.exists() and len(obj.modifiers) == 2
+
+
+def test_the_half_that_a_mirror_makes_is_not_refined_as_the_other(tmp_path):
+    obj, _ = tube()
+    obj.modifiers.new("Half", "MIRROR")
+    obj.modifiers.move(1, 0)
+    for operator in (bpy.ops.skinwright.bake_correctives, bpy.ops.skinwright.live_refine):
+        with pytest.raises(RuntimeError, match="Limb has the modifier Half before its armature"):
+            operator()
+
+
 class TestForeignFiles:
     """Baking costs nobody a file; baking again replaces what was baked."""
 
@@ -248,3 +319,64 @@ class TestForeignFiles:
         with pytest.raises(RuntimeError, match=r"scene.blend exists already"):
             bpy.ops.skinwright.bake_refined_cache(filepath=str(path), kind="PC2", frame_start=1, frame_end=2)
         assert path.read_bytes() == b"BLENDER"
+
+    def test_a_cache_replaces_its_own_only(self, tmp_path):
+        obj, rig = tube()
+        bent(rig)
+        path = tmp_path / "cloth.pc2"
+        path.write_bytes(b"POINTCACHE2 of another program")
+        bake = {"filepath": str(path), "frame_start": 1, "frame_end": 2}
+        with pytest.raises(RuntimeError, match=r"cloth.pc2 exists already"):
+            bpy.ops.skinwright.bake_refined_cache(**bake)
+        assert path.read_bytes() == b"POINTCACHE2 of another program" and len(obj.modifiers) == 1
+        assert bpy.ops.skinwright.bake_refined_cache(**bake, overwrite=True) == {"FINISHED"}
+        assert bpy.ops.skinwright.bake_refined_cache(**bake) == {"FINISHED"}
+        bpy.ops.skinwright.remove_refined_cache()
+        assert bpy.ops.skinwright.bake_refined_cache(**bake) == {"FINISHED"}
+
+    def test_no_cache_is_taken_from_another_object(self, tmp_path):
+        obj, rig = tube()
+        bent(rig)
+        bake = {"filepath": str(tmp_path / "limb.pc2"), "frame_start": 1, "frame_end": 2}
+        bpy.ops.skinwright.bake_refined_cache(**bake)
+        content = (tmp_path / "limb.pc2").read_bytes()
+        other = obj.copy()
+        other.data, other.name = obj.data.copy(), "Other"
+        bpy.context.collection.objects.link(other)
+        builders.select(other)
+        for overwrite in (False, True):
+            with pytest.raises(RuntimeError, match=r"limb.pc2 is played by Limb"):
+                bpy.ops.skinwright.bake_refined_cache(**bake, overwrite=overwrite)
+        assert (tmp_path / "limb.pc2").read_bytes() == content
+
+
+def test_objects_of_libraries_may_have_the_same_names(addon, tmp_path):
+    """The armature is the one that the modifier names, not the local one that is called so."""
+    tube()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    local, rig = tube()
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
+        here.objects = ["Limb", "Rig"]
+    linked = next(obj for obj in here.objects if obj.type == "MESH")
+    for obj in here.objects:
+        bpy.context.collection.objects.link(obj)
+    turn(rig, (1, 0, 0), 90)
+    character = part(addon, "refine.character")
+    assert np.allclose(character.pose(linked, character.read(linked)), np.eye(4))
+    assert not np.allclose(character.pose(local, character.read(local)), np.eye(4))
+    builders.select(linked)
+    assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
+    (copy,) = [obj for obj in bpy.data.objects if obj.get("skinwright_preview_of")]
+    assert np.abs(shown(copy) - shown(linked)).max() < 0.01
+    bpy.ops.skinwright.live_refine()
+
+
+def test_bones_of_the_command_line_are_those_of_the_armature(addon, tmp_path, capsys):
+    tube()
+    command = addon.headless.command_line.refine
+    assert command(["correctives", "--object", "Limb", "--bone", "Lower", "--bone", "Elbow"]) == 1
+    assert "Rig has no bone Elbow" in capsys.readouterr().err
+    assert bpy.data.objects["Limb"].data.shape_keys is None
+    assert command(["remove", "--object", "Limb", "--report", str(tmp_path / "report.json")]) == 0
+    assert "0 corrective keys" in json.loads((tmp_path / "report.json").read_text())["sentence"]

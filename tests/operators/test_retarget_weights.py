@@ -102,6 +102,49 @@ def test_locked_groups_and_other_groups_stay(man, child):
     assert np.allclose(rows, (0.3, 0.25))
 
 
+@pytest.mark.parametrize("locked", [ARM[:1], ARM[1:], ARM])
+def test_the_others_fill_what_locked_groups_leave(man, child, locked):
+    """Also where the new weights are of locked bones alone: there the old ones make room."""
+    obj = child[1][0]
+    builders.paint(obj, **{name.replace(".", "__"): 0.9 / len(locked) for name in locked})
+    for name in locked:
+        obj.vertex_groups[name].lock_weight = True
+    assert retarget(child[1], max_influences=3) == {"FINISHED"}
+    rows = builders.dense(obj, ARM)
+    assert np.allclose(rows[:, [ARM.index(name) for name in locked]], 0.9 / len(locked))
+    free = [name for name in ARM if name not in locked]
+    filled = truth(obj, 2.0)[:, [ARM.index(name) for name in free]].sum(1) > 0.05
+    assert np.allclose(rows.sum(1)[filled], 1, atol=1e-5) and rows.sum(1).max() < 1 + 1e-5
+    assert np.allclose(builders.dense(child[1][1], ARM).sum(1), 1, atol=1e-5)
+
+
+def test_locked_groups_that_leave_nothing_are_named(man, child):
+    obj = child[1][0]
+    builders.paint(obj, Upper__L=0.7, Lower__L=0.7)
+    for group in obj.vertex_groups:
+        group.lock_weight = True
+    before = builders.weights(obj)
+    with pytest.raises(RuntimeError, match="locked groups of Child 0 sum to more than 1 at .* first is vertex 0"):
+        retarget(child[1])
+    assert builders.weights(obj) == before
+
+
+def test_one_mesh_is_not_two_targets_nor_source_and_target(addon, man, child):
+    target, (_, third) = child[1][0], limb("Third", length=2.0, at=(8, 1, 0))
+    own, source = third[0].data, next(o for o in bpy.data.objects if o.name.startswith("Man ") and o.type == "MESH")
+    for shared, objects in ((target.data, (target, third[0])), (source.data, (third[0],))):
+        third[0].data = shared
+        before = [builders.weights(obj) for obj in (source, target)]
+        with pytest.raises(RuntimeError, match="share one mesh and so its weights"):
+            retarget(objects)
+        assert [builders.weights(obj) for obj in (source, target)] == before
+    third[0].data = own
+    twin = bpy.data.objects.new("Twin", own)
+    bpy.context.scene.collection.objects.link(twin)
+    retarget(third)
+    assert any("shares its mesh with Twin" in warning for warning in addon.reporting.last.warnings)
+
+
 def test_the_correspondence_is_shown(man, child):
     retarget(child[1], show_correspondence=True)
     for obj in child[1]:

@@ -97,8 +97,23 @@ BAD = [
     ({"positions": np.zeros((1, 144, 3))}, "it needs `frames`, or `bones` and `matrices`"),
     ({"positions": np.zeros((1, 144, 3)), "frames": [1, 2]}, "`frames` must have shape (1,)"),
     ({"positions": np.zeros((1, 9, 3)), "frames": [1]}, "Body has 144 vertices, but 9 were sculpted"),
-    ({"positions": np.zeros((1, 144, 3)), "bones": ["Tail"], "matrices": np.ones((1, 1, 4, 4))}, "has no bone Tail"),
+    ({"positions": np.zeros((1, 144, 3)), "bones": ["Tail"], "matrices": np.eye(4)[None, None]}, "has no bone Tail"),
     ({"positions": np.zeros((1, 144, 3)), "frames": [1]}, "Rig is at rest"),
+    ({"positions": np.zeros((1, 144, 3)), "frames": [1 << 40]}, "there is no frame 1099511627776"),
+    ({"positions": np.zeros((1, 144, 3)), "frames": [-1_048_575]}, "there is no frame -1048575"),
+    ({"positions": np.full((1, 144, 3), np.inf), "frames": [1]}, "infinite numbers"),
+    (
+        {"positions": np.zeros((1, 144, 3)), "bones": ["Arm.L"], "matrices": np.zeros((1, 1, 4, 4))},
+        "must end in the row 0, 0, 0, 1",
+    ),
+    (
+        {
+            "positions": np.zeros((1, 144, 3)),
+            "bones": ["Arm.L", "Arm.L"],
+            "matrices": np.tile(np.eye(4), (1, 2, 1, 1)),
+        },
+        "names a bone twice",
+    ),
 ]
 
 

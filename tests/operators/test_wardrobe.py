@@ -133,6 +133,15 @@ def test_settings_of_a_manifest_and_of_a_garment(run, folder):
         ({"garments": [{"file": "a.glb", "bodies": ["who"]}]}, "the body who"),
         ({"garments": [{"file": "a.glb"}, {"file": "b/a.glb"}]}, "two jobs are called body--a"),
         ({"bodies": [3]}, "a body must be a JSON object"),
+        ({"bodies": "body"}, "bodies of the manifest must be a list"),
+        ({"bodies": [{"file": "bodies/body.blend"}, {"file": "other/Body.glb"}]}, "two bodies are called Body"),
+        ({"bodies": [{"file": 5}]}, "file of a body must be a text, not 5"),
+        ({"bodies": [{"file": "bodies/body.blend", "name": "../body"}]}, "cannot be the name of a body"),
+        ({"garments": [{"file": "a.glb", "name": "/tmp/coat"}]}, "cannot be the name of a garment"),
+        ({"garments": [{"file": "a.glb", "bodies": []}]}, "must be a list of names"),
+        ({"garments": [{"file": "a.glb", "bodies": "body"}]}, "must be a list of names"),
+        ({"garments": [{"file": "a.glb", "objects": "Coat"}]}, "objects of a garment must be a list of texts"),
+        ({"settings": []}, "settings of a manifest must be an object"),
     ],
 )
 def test_a_manifest_that_cannot_be_meant(run, folder, change, says, capsys):
@@ -144,6 +153,99 @@ def test_a_manifest_that_cannot_be_meant(run, folder, change, says, capsys):
     assert says in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [("--shard", "3/3"), ("--shard", "x"), ("--job", "body--hat")])
+@pytest.mark.parametrize(
+    "arguments", [("--shard", "3/3"), ("--shard", "x"), ("--shard", "0/1/2"), ("--job", "body--hat")]
+)
 def test_arguments_that_cannot_be_meant(run, arguments):
     assert run(*arguments) == (2, None)
+
+
+def of(folder, body="bodies/body.blend", *garments):
+    """A manifest of one body."""
+    manifest = folder / "wardrobe.json"
+    manifest.write_text(json.dumps({"bodies": [{"file": body}], "garments": garments}), encoding="utf-8")
+    return manifest
+
+
+@pytest.mark.parametrize("settings", [{"nonsense": 1}, {"max_influences": "four"}, {"max_influences": -1}])
+def test_wrong_settings_of_one_garment_stop_no_other(run, folder, settings):
+    bad, good = {"file": "garments/belt.blend", "settings": settings}, {"file": "garments/coat.blend"}
+    code, report = run(manifest=of(folder, "bodies/body.blend", bad, good))
+    assert code == 1 and statuses(report) == {"body--belt": "failed", "body--coat": "done"}
+    assert "settings of body--belt: " in report["outcomes"][0]["error"]
+
+
+def test_what_nobody_foresaw_stops_no_other(run, addon, monkeypatch, capsys):
+    work = addon.headless.wardrobe.work
+    whole = work.transfer_weights
+
+    def transfer_weights(context, source, targets, params):
+        if targets[0].name == "Belt":
+            raise KeyError("a bug")
+        return whole(context, source, targets, params)
+
+    monkeypatch.setattr(work, "transfer_weights", transfer_weights)
+    code, report = run()
+    assert code == 1 and statuses(report) == {"body--belt": "failed", "body--coat": "done", "body--nothing": "failed"}
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_objects_keep_the_names_of_their_file(run, folder, tmp_path):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    builders.grid("Body", 9, size=1.8, z=0.02)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "garments" / "suit.blend"), copy=True)
+    garment = {"file": "garments/suit.blend", "objects": ["Body"]}
+    assert run(manifest=of(folder, "bodies/body.blend", garment))[0] == 0
+    with np.load(tmp_path / "out" / "body--suit.npz", allow_pickle=False) as weights:
+        assert weights["objects"].tolist() == ["Body"]
+
+
+def test_the_buffer_of_a_gltf_is_an_input(run, folder):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    builders.grid("Coat", 9, size=1.8, z=0.02)
+    path = folder / "garments" / "coat.gltf"
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLTF_SEPARATE")
+    manifest = of(folder, "bodies/body.blend", {"file": "garments/coat.gltf"})
+    assert [statuses(run(manifest=manifest)[1]) for _ in range(2)] == [{"body--coat": "done"}, {"body--coat": "kept"}]
+    buffer = path.with_suffix(".bin")
+    positions = np.frombuffer(buffer.read_bytes(), np.float32).copy()
+    positions[0] += 0.01
+    buffer.write_bytes(positions.tobytes())
+    assert statuses(run(manifest=manifest)[1]) == {"body--coat": "done"}
+
+
+def test_a_library_of_a_garment_is_an_input(run, folder):
+    library, path = folder / "meshes.blend", folder / "garments" / "linked.blend"
+    for x in (0, 0.01):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        builders.grid("Coat", 9, size=1.8, z=0.02).data.vertices[0].co.x += x
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"meshes{x}.blend"), copy=True)
+    shutil.copy(folder / "meshes0.blend", library)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(library), link=True) as (there, here):
+        here.meshes = there.meshes
+    group = bpy.data.objects.new("Shape", here.meshes[0])
+    bpy.context.scene.collection.objects.link(group)
+    coat = builders.grid("Coat", 9, size=1.8, z=0.02)
+    coat.modifiers.new("Shrinkwrap", "SHRINKWRAP").target = group
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    garment = {"file": "garments/linked.blend", "objects": ["Coat"]}
+    manifest = of(folder, "bodies/body.blend", garment)
+    assert [statuses(run(manifest=manifest)[1]) for _ in range(2)] == [
+        {"body--linked": "done"},
+        {"body--linked": "kept"},
+    ]
+    shutil.copy(folder / "meshes0.01.blend", library)
+    assert statuses(run(manifest=manifest)[1]) == {"body--linked": "done"}
+
+
+def test_no_output_costs_an_input_or_a_foreign_file(addon, run, folder, tmp_path, capsys):
+    manifest = of(folder, "bodies/body.blend", {"file": "garments/coat.blend"})
+    named = manifest.rename(folder / "report.json")
+    before = named.read_bytes()
+    assert addon.headless.command_line.wardrobe([str(named), "--out", str(folder)]) == 1
+    assert named.read_bytes() == before and "is an input" in capsys.readouterr().err
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.json").write_text("my notes")
+    assert addon.headless.command_line.wardrobe([str(named), "--out", str(tmp_path / "out")]) == 1
+    assert (tmp_path / "out" / "report.json").read_text() == "my notes"

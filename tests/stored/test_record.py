@@ -100,11 +100,33 @@ def changed(record, kept, header=None, **arrays):
         ({}, {"values": np.array(["a"] * 6)}, "`values` is missing or of another type"),
         ({}, {"positions": np.zeros((5, 2), np.float32)}, "lengths"),
         ({}, {"triangles": np.array([[0, 1, 5]])}, "names a vertex that is not there"),
+        ({}, {"groups": np.array([3, 3, 1, 2, 1, 0])}, "in a group twice"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(record, kept, header, arrays, sentence):
     with pytest.raises(record.RecordError, match=sentence):
         record.from_npz(changed(record, kept, header, **arrays))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("vertices", [[[1.5, 0.1], [0, 0.3]], [], [], [], []]),
+        ("vertices", [[["1", 0.1]], [], [], [], []]),
+        ("vertices", [[[1, "0.1"]], [], [], [], []]),
+        ("vertices", [[[1, None]], [], [], [], []]),
+        ("vertices", [[[1, 0.1, 5]], [], [], [], []]),
+        ("vertices", [{"0": 1}, [], [], [], []]),
+        ("positions", [0.0] * 15),
+        ("positions", [["0", "0", "0"]] * 5),
+        ("triangles", [[0, 1, 2.5]]),
+        ("triangles", [0, 1, 2]),
+    ],
+)
+def test_no_number_of_a_json_file_is_rounded_or_guessed(record, kept, name, value):
+    content = json.loads(record.to_json(kept)) | {name: value}
+    with pytest.raises(record.RecordError):
+        record.from_json(json.dumps(content))
 
 
 def test_damaged_files_are_refused(record, kept):

@@ -226,9 +226,64 @@ def test_a_damaged_import_changes_nothing(body, digest, keeping, tmp_path):
     assert digest(body) == before and not keeping.entries(body)
 
 
+@pytest.mark.parametrize("ending", ["npz", "json"])
+@pytest.mark.parametrize("weight", [float("nan"), 7.0, -0.5])
+def test_no_file_holds_or_brings_what_is_no_weight(addon, body, digest, tmp_path, ending, weight):
+    stored, record = (importlib.import_module(f"{addon.__name__}.stored.{name}") for name in ("exchange", "record"))
+    kept = importlib.import_module(addon.__name__ + ".stored.keeping").take(body)
+    kept.values[3] = weight
+    path, before = tmp_path / f"body.{ending}", digest(body)
+    with pytest.raises(record.RecordError, match="Body: the weight of vertex 1 in group Arm.L is"):
+        stored.write(path, kept)
+    assert not path.exists()
+    path.write_bytes(record.to_npz(kept) if ending == "npz" else record.to_json(kept).encode())
+    with pytest.raises(RuntimeError, match="must be a number from 0 to 1"):
+        bpy.ops.skinwright.import_weights(filepath=str(path))
+    assert digest(body) == before
+
+
+@pytest.mark.parametrize("name", ["x" * 100, "a\0b", "\ud800"])
+def test_a_name_that_no_group_can_have_changes_nothing(body, digest, tmp_path, name):
+    path, before = tmp_path / "body.json", digest(body)
+    bpy.ops.skinwright.export_weights(filepath=str(path))
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["names"][0] = name
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(RuntimeError, match="Body cannot have a group called"):
+        bpy.ops.skinwright.import_weights(filepath=str(path))
+    assert digest(body) == before
+
+
+def test_the_order_of_vertices_without_faces_is_not_trusted(scene):
+    wire = builders.mesh("Wire", [(x, 0, 0) for x in range(6)], [])
+    wire.data.edges.add(5)
+    wire.data.edges.foreach_set("vertices", [0, 1, 1, 2, 2, 3, 3, 4, 4, 5])
+    builders.paint(wire, Arm=np.linspace(0.2, 0.7, 6))
+    builders.select(wire)
+    bpy.ops.skinwright.store_weights()
+    for vertex in wire.data.vertices:
+        vertex.co.x = 5 - vertex.co.x
+    bpy.ops.skinwright.restore_weights()
+    assert np.allclose(builders.dense(wire, ["Arm"])[:, 0], np.linspace(0.7, 0.2, 6))
+    for vertex in wire.data.vertices:
+        vertex.co.z += 1  # merely moved
+    bpy.ops.skinwright.restore_weights(state="0")
+    assert np.allclose(builders.dense(wire, ["Arm"])[:, 0], np.linspace(0.2, 0.7, 6))
+
+
+def test_states_of_a_later_version_are_not_lost(body, keeping):
+    bpy.ops.skinwright.store_weights(state_name="Precious")
+    (entry,) = json.loads(body.data["skinwright_weights_index"])
+    body.data["skinwright_weights_index"] = json.dumps([entry | {"colour": "red"}]).encode()
+    bpy.ops.skinwright.store_weights(state_name="Second")
+    assert [entry.name for entry in keeping.entries(body)] == ["Precious", "Second"]
+    bpy.ops.skinwright.restore_weights(state="0")
+
+
 def test_a_damaged_index_is_as_none(body, keeping):
-    body.data["skinwright_weights_index"] = b"junk"
-    assert keeping.entries(body) == []
+    for junk in (b"junk", b"{}", b"[[]]", b'[{"name": 5}]', b"[" * 100_000):
+        body.data["skinwright_weights_index"] = junk
+        assert keeping.entries(body) == []
     bpy.ops.skinwright.store_weights()
     assert len(keeping.entries(body)) == 1
     key = next(key for key in body.data.keys() if "blob" in key)
@@ -272,6 +327,7 @@ class TestCommand:
         assert weights("list", "--object", "Body") == 0
         assert "Mine: 256 vertices" in capsys.readouterr().out
         assert weights("forget", tmp_path / "out.blend", "--object", "Body") == 0
+        assert "nothing was saved: name a file with --save" in capsys.readouterr().err
 
     def test_refusals(self, weights, body, tmp_path, capsys):
         (tmp_path / "mine.npz").write_bytes(b"mine")

@@ -47,6 +47,7 @@ class Target:
 def read(objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, params: AutoskinParams) -> list[Target]:
     """Every mesh, with `rig` or the armature that deforms it. Raises SceneError with the object, problem and cure."""
     rigs = [_rig_of(obj, rig) for obj in objects]
+    editable.check_separate(objects)
     bones = {one.name: _bones_of(one) for one in dict.fromkeys(rigs)}
     with shapes.looked_at([*objects, *rigs], params.geometry):
         pairs = zip(objects, rigs, strict=True)

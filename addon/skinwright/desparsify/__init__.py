@@ -46,6 +46,8 @@ def desparsify_all(
 
     `before_write` is told when writing begins.
     """
+    objects = list(dict.fromkeys(objects))  # one named twice is one
+    editable.check_separate(objects)
     answers = [_compute(obj, params) for obj in objects]
     if before_write:
         before_write(objects)

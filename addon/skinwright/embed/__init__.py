@@ -75,6 +75,7 @@ def steps(
     for obj, shape in zip(targets, shapes, strict=True):
         if not len(shape.triangles):
             raise SceneError(f"{obj.name} has no faces: bones are laid into a surface, so give it some")
+        _check_extent(obj, shape.positions)
     positions, triangles, _ = joined(shapes)
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
@@ -105,8 +106,15 @@ def _donor(
             f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "
             "or set Method to Shape Alone"
         )
-    positions, triangles, _ = joined([mesh.read(obj) for obj in meshes])
+    shapes = [mesh.read(obj) for obj in meshes]
+    positions, triangles, _ = joined(shapes)
+    _check_extent(meshes[0], positions)
     return positions, triangles, joined_rows(meshes, bones.names)
+
+
+def _check_extent(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:
+    if not np.ptp(positions, axis=0).any():
+        raise SceneError(f"All vertices of {obj.name} lie at one place: bones need room, so give it a shape")
 
 
 def mirror(names: list[str]) -> NDArray[np.int32]:
@@ -129,6 +137,8 @@ def _write(
     params: EmbedParams,
 ) -> EmbedReport:
     name = f"{targets[0].name} Rig"
+    if not all(np.isfinite(found).all() for found in (embedding.heads, embedding.tails, embedding.confidence)):
+        raise SceneError(f"{source.name} does not fit {targets[0].name}, so nothing was made: look at both shapes")
     confidence = dict(zip(bones.names, embedding.confidence.tolist(), strict=True))
     places = {b: (h, t) for b, h, t in zip(bones.names, embedding.heads, embedding.tails, strict=True)}
     outside = [bones.names[j] for j in embedding.report["outside"]]

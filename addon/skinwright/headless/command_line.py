@@ -226,7 +226,7 @@ def _origin(options: argparse.Namespace) -> str:
 
 def _settings_of(options: argparse.Namespace) -> Any:
     """Those of the file, overruled by those of the command line."""
-    settings = json.loads(options.settings.read_text(encoding="utf-8")) if options.settings else {}
+    settings = json.loads(options.settings.read_text(encoding="utf-8-sig")) if options.settings else {}
     given = {name.removeprefix("set "): text for name, text in vars(options).items() if name.startswith("set ")}
     given = {name: _value(text) for name, text in given.items() if text is not None}
     return settings | given if given and isinstance(settings, dict) else settings

@@ -12,7 +12,7 @@ from ..declared import declared, described, from_json
 from ..errors import Refused
 from ..refine import cache, correctives
 from ..refine.params import CacheFormat, CorrectiveParams
-from ..scene import blend_file, mesh_cache
+from ..scene import armature, blend_file, mesh_cache
 from ..scene.error import SceneError
 
 Report = correctives.CorrectiveReport | cache.CacheReport
@@ -47,8 +47,9 @@ def run(options: argparse.Namespace, value: Callable[[str], object]) -> int:
     report = ACTIONS[options.action](options, blend_file.mesh_named(options.object), params)
     if options.save:
         blend_file.save_copy(options.save)
-    if options.report and not isinstance(report, str):
-        files.write_report(options.report, report.to_json(), overwrite=options.overwrite)
+    if options.report:
+        content = {"sentence": report} if isinstance(report, str) else report.to_json()
+        files.write_report(options.report, content, overwrite=options.overwrite)
     print(report if isinstance(report, str) else report.sentence())
     return 0
 
@@ -79,6 +80,10 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 
 def _correctives(options: argparse.Namespace, obj: bpy.types.Object, params: CorrectiveParams) -> Report:
+    rig = armature.find(obj)
+    unknown = [name for name in options.bone if rig and name not in rig.data.bones]
+    if rig and unknown:
+        raise SceneError(f"{rig.name} has no bone {unknown[0]}: name its bones")
     return jobs.wait(correctives.steps(obj, params, set(options.bone)))
 
 
@@ -89,6 +94,7 @@ def _cache(options: argparse.Namespace, obj: bpy.types.Object, params: Correctiv
     first, last = options.frames or (scene.frame_start, scene.frame_end)
     kind: CacheFormat = "mdd" if options.cache.suffix.lower() == ".mdd" else "pc2"
     path = options.cache.resolve()
+    mesh_cache.is_own(obj, path)
     return jobs.wait(cache.steps(obj, params, path, (first, last), kind, overwrite=options.overwrite))
 
 

@@ -1,6 +1,7 @@
 """`skinwright weights ACTION [file.blend] --object NAME`: stored weights without a window."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ..scene import blend_file
 from ..scene.error import SceneError
 from ..stored import comparing, exchange, keeping, restoring
 
+_CHANGING = ("store", "restore", "forget", "import")
 Action = Callable[[argparse.Namespace, bpy.types.Object], str]
 
 
@@ -43,6 +45,8 @@ def run(options: argparse.Namespace) -> int:
     print(ACTIONS[options.action](options, blend_file.mesh_named(options.object)))
     if options.save:
         blend_file.save_copy(options.save)
+    elif options.blend and options.action in _CHANGING:
+        print("skinwright: warning: nothing was saved: name a file with --save", file=sys.stderr)
     return 0
 
 

@@ -2,6 +2,9 @@
 
 Between `begin` and the end the artist paints with Blender's own brushes; `tick` is called now and then while no stroke
 is going on. Objects are found by name each time, as undo replaces them.
+
+A stroke on a large target is answered twice: at once with the rows around it, and once the brush has rested with the
+solve of the whole, which does not depend on the strokes before.
 """
 
 import time
@@ -11,11 +14,14 @@ import bpy
 from .. import jobs, native
 from ..scene import armature, brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
+from ..transfer.compute import Result
 from ..transfer.params import TransferParams
 from .session import MatchSession
 
 # A solve this short is waited for: the view would be drawn in between, which takes about as long.
 PATIENCE_SECONDS = 0.4
+# How long the brush rests before the whole is solved: the view and the overlay are drawn meanwhile.
+REST_SECONDS = 0.3
 
 # What the brush paints into the mask's group.
 BRUSH_WEIGHTS = {"INPAINT": 0.0, "AUTOMATIC": 0.5, "MATCH": 1.0}
@@ -47,6 +53,11 @@ class MaskPainting:
         self._runner: jobs.Runner | None = None
         self._asked: tuple = ()
         self._since = 0.0
+        # What the rows written last are solved with, if only those around a stroke are.
+        self.unsettled: TransferParams | None = None
+        self.settled_at = 0.0
+        self._settling = False
+        self._params = params
         self._modifiers: list[str] = []
         self.expect_stroke()
 
@@ -70,6 +81,9 @@ class MaskPainting:
     def expect_stroke(self) -> None:
         """A brush is down or may come down: the mask is to be read before Blender evaluates and counts the change."""
         self._version = -1
+        if self._settling:
+            # The stroke is not to wait for it.
+            self._stop()
 
     def undone(self) -> None:
         """Undo has brought back old weights with the old mask."""
@@ -86,16 +100,19 @@ class MaskPainting:
         asked = (self.session.mask_version, params)
         if live and asked != self._asked:
             self._asked = asked
-            self._start(params)
+            self._start(params, near=True)
             if self._runner:
                 self._runner.wait(PATIENCE_SECONDS)
+        elif self.unsettled and self._runner is None and time.perf_counter() > self.written_at[-1] + REST_SECONDS:
+            self._start(self.unsettled, near=False)
+            self._settling = self._runner is not None
         return self._take_in(target)
 
-    def _start(self, params: TransferParams) -> None:
+    def _start(self, params: TransferParams, near: bool) -> None:
         self._stop()
-        self.problem, self._since = "", time.perf_counter()
+        self.problem, self._since, self._params = "", time.perf_counter(), params
         try:
-            self._runner = jobs.Runner(self.session.solve(params))
+            self._runner = jobs.Runner(self.session.solve(params, near))
             self.session.solving = True
         except native.NativeError as error:
             self.problem = str(error)
@@ -107,24 +124,44 @@ class MaskPainting:
             if not self._runner.poll():
                 return False
         except native.NativeError as error:
+            if self._settling:
+                self.unsettled = None
             self._stop()
             self.problem = str(error)
             return False
         except BaseException:
             self._stop()
             raise
-        result = self._runner.result
+        result, was_settling = self._runner.result, self._settling
         self._stop()
-        self.session.write(target, result)
-        self.written_at.append(time.perf_counter())
-        self.seconds.append(self.written_at[-1] - self._since)
+        self._write(target, result)
+        if not was_settling:
+            self.written_at.append(time.perf_counter())
+            self.seconds.append(self.written_at[-1] - self._since)
         return True
+
+    def _write(self, target: bpy.types.Object, result: Result) -> None:
+        self.session.write(target, result)
+        self.unsettled = None if result.report["solved_near"] is None else self._params
+        if self.unsettled is None:
+            self.settled_at = time.perf_counter()
+
+    def settle(self) -> None:
+        """Solve the whole now if only the rows around a stroke have been solved."""
+        target = self.session.target()
+        if target is None or self.unsettled is None:
+            return
+        self._stop()
+        try:
+            self._write(target, jobs.wait(self.session.solve(self.unsettled)))
+        except native.NativeError as error:
+            self.problem, self.unsettled = str(error), None
 
     def _stop(self) -> None:
         if self._runner:
             if not self._runner.done:
                 self._runner.cancel()
-            self._runner, self.session.solving = None, False
+            self._runner, self.session.solving, self._settling = None, False, False
 
     def stop(self) -> None:
         """Leave the solve that is going on; what it would have written is not."""
@@ -133,6 +170,7 @@ class MaskPainting:
     def finish(self) -> None:
         """Keep mask and weights; the active group becomes what it was."""
         self._stop()
+        self.settle()
         target = self.session.target()
         if target:
             vertex_groups.activate(target, self.before.active)

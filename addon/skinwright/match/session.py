@@ -129,10 +129,11 @@ class MatchSession:
             return match.category == Category.UNMATCHED_ISLAND
         return self.matched(match) == (what == "MATCHED")
 
-    def solve(self, params: TransferParams) -> Jobs[Result]:
-        """The new rows under the mask as it was read last."""
+    def solve(self, params: TransferParams, near: bool = False) -> Jobs[Result]:
+        """The new rows under the mask as it was read last; with `near` sooner, and not quite the same, if the mask has
+        changed in few places since the last solve: `report["solved_near"]` is a number then."""
         garment = replace(self.garment, mask=self.mask)
-        transfer, rows = yield from bone_rows(self.inpainting, garment, params)
+        transfer, rows = yield from bone_rows(self.inpainting, garment, params, near)
         return to_result(self.body, garment, transfer, garment.names, rows, 0.0)
 
     def write(self, target: bpy.types.Object, result: Result) -> int:

@@ -67,7 +67,7 @@ class SKINWRIGHT_OT_bone_map_save(ExportHelper, SkinwrightOperator):
         """Names only: it may be read for other characters."""
         entries = {entry.name: entry.source for entry in context.scene.skinwright.retarget.bone_map}
         text = json.dumps({"bone_map": entries}, indent=2, ensure_ascii=False)
-        path = Path(self.filepath)
+        path = Path(bpy.path.abspath(self.filepath))
         files.check_output(path, others=blend_file.opened(), overwrite=_is_bone_map(path))
         files.write_whole(path, (text + "\n").encode())
         return {"FINISHED"}
@@ -98,7 +98,7 @@ class SKINWRIGHT_OT_bone_map_load(ImportHelper, SkinwrightOperator):
 
     def work(self, context: Context) -> set[str]:
         """Names of bones that these characters lack are left out."""
-        given = read_map(Path(self.filepath))
+        given = read_map(Path(bpy.path.abspath(self.filepath)))
         settings, rig = context.scene.skinwright.retarget, target_armature(context)
         source, target = rest_bones_of(settings.source).names, rest_bones_of(rig).names
         known = {bone: other for bone, other in given.items() if bone in target and (not other or other in source)}
@@ -131,7 +131,7 @@ def fill(settings: SKINWRIGHT_PG_retarget, rig: Object, given: dict[str, str]) -
 def read_map(path: Path) -> dict[str, str]:
     """The names of a file. Raises Refused if it holds no bone map."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise Refused(f"{path.name} cannot be read as a bone map: {error}") from error
     entries = content.get("bone_map") if isinstance(content, dict) else None

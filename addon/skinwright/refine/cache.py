@@ -55,10 +55,12 @@ def steps(
     first, last = frames
     if last < first:
         raise SceneError(f"the last frame, {last}, lies before the first, {first}")
+    if max(-first, last) > poses.LAST_FRAME:
+        raise SceneError(f"frames {first} to {last} are too far out: Blender shows none beyond {poses.LAST_FRAME}")
     mesh_cache.check(obj)
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)
-    seen = Watched([obj, bpy.data.objects[character.rig]])
+    seen = Watched([obj, characters.rig_of(obj)])
     memory.expect(f"Refining {last - first + 1} frames of {obj.name}", _bytes(character, last - first + 1))
     matrices = list(_poses(obj, character, range(first, last + 1)))
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
-from ..scene import armature, mesh, vertex_groups
+from ..scene import armature, mesh, mirror, shapes, vertex_groups
 from ..scene.error import SceneError
 from .params import RefineParams
 
@@ -59,15 +59,19 @@ class Character:
 
 def read(obj: bpy.types.Object) -> Character:
     """Everything about a mesh that no pose changes. Raises SceneError before anything is written."""
-    rig = armature.find(obj)
-    if rig is None:
-        raise SceneError(f"{obj.name} has no armature whose joints could be refined: give it an Armature modifier")
+    rig = rig_of(obj)
     deforming, members = armature.deform_bones(rig), {group.name for group in obj.vertex_groups}
     bones = [bone.name for bone in rig.data.bones if bone.name in deforming and bone.name in members]
     if not bones:
         raise SceneError(f"{obj.name} has no vertex group of a deform bone of {rig.name}: give it weights first")
     mesh.check_world(obj, rig)
-    positions = mesh.rest_positions(obj.data)
+    halves = mirror.before_the_pose(obj)
+    if halves:
+        raise SceneError(
+            f"{obj.name} has the modifier {halves[0].name} before its armature, and the half it makes would be refined "
+            "as the other one: apply it first"
+        )
+    positions = shapes.before_the_pose(obj)
     if not np.isfinite(positions).all():
         raise SceneError(f"{obj.name} has a coordinate that is not a number: move or delete that vertex")
     rows = vertex_groups.read(obj, bones)
@@ -77,7 +81,7 @@ def read(obj: bpy.types.Object) -> Character:
         name=obj.name,
         rig=rig.name,
         positions=positions,
-        triangles=mesh.triangles(obj),
+        triangles=_outward(positions, mesh.triangles(obj)),
         rows=csr.Rows(*rows),
         bones=bones,
         parents=armature.parents(rig, bones),
@@ -86,6 +90,13 @@ def read(obj: bpy.types.Object) -> Character:
         preserve_volume=preserves_volume(obj),
         armature_from_mesh=np.linalg.inv(object_from_armature),
     )
+
+
+def _outward(positions: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """The triangles (T, 3), all turned over if the mesh is inside out: flesh is what it encloses."""
+    a, b, c = (positions[triangles] - positions.mean(axis=0)).astype(np.float64).transpose(1, 0, 2)
+    volume = np.einsum("ti,ti->", a, np.cross(b, c))
+    return np.ascontiguousarray(triangles[:, ::-1]) if volume < 0 else triangles
 
 
 def _moved(matrix: NDArray[np.float64], positions: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -101,4 +112,12 @@ def preserves_volume(obj: bpy.types.Object) -> bool:
 
 def pose(obj: bpy.types.Object, character: Character) -> NDArray[np.float64]:
     """(B, 4, 4) the present pose."""
-    return armature.pose_from_rest(obj, bpy.data.objects[character.rig], character.bones)
+    return armature.pose_from_rest(obj, rig_of(obj), character.bones)
+
+
+def rig_of(obj: bpy.types.Object) -> bpy.types.Object:
+    """The armature that deforms the mesh: another object, of a library, may have its name. Raises SceneError."""
+    rig = armature.find(obj)
+    if rig is None:
+        raise SceneError(f"{obj.name} has no armature whose joints could be refined: give it an Armature modifier")
+    return rig

@@ -97,11 +97,11 @@ def steps(
     """
     driven_keys.check(obj)
     character = characters.read(obj)
-    seen = Watched([obj, bpy.data.objects[character.rig]])
+    seen = Watched([obj, characters.rig_of(obj)])
     bones = joints(character, chosen or set())
     if not bones:
         raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
-    rig = bpy.data.objects[character.rig]
+    rig = characters.rig_of(obj)
     poses = samples(bones, params, [armature.rotation_limits(rig, character.bones[bone]) for bone in bones])
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
     solved = yield Solving([partial(_solve, character, refiner, sample, params) for sample in poses])
@@ -182,7 +182,7 @@ def _of_joint(figures: dict[str, Any], bone: int) -> dict[str, float]:
 def _write(obj: bpy.types.Object, character: Character, keys: list[_Solved], report: CorrectiveReport) -> None:
     remove(obj)
     report.made_basis = obj.data.shape_keys is None
-    rig = bpy.data.objects[character.rig]
+    rig = characters.rig_of(obj)
     for key in keys:
         sample = key.sample
         name = f"{PREFIX} {character.bones[sample.bone]} {'+' if sample.sign > 0 else '-'}{sample.axis}"

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import native
-from ..scene import preview_object
+from ..scene import armature, identity, preview_object
 from ..scene.error import SceneError
+from ..scene.identity import Identity
 from . import character as characters
 from .character import Character
 from .follow import Follower, follow
@@ -17,11 +18,12 @@ from .params import RefineParams
 
 @dataclass
 class Live:
-    """A preview under way; objects are looked up by name, as undo replaces them."""
+    """A preview under way. `object` and those of `garments` are found anew each time, as undo replaces them."""
 
+    object: Identity
     body: Character
     refiner: native.Refiner
-    garments: list[Follower] = field(default_factory=list)
+    garments: list[tuple[Identity, Follower]] = field(default_factory=list)
     pose: NDArray[np.float64] | None = None
 
 
@@ -33,11 +35,11 @@ def start(obj: bpy.types.Object, garments: list[bpy.types.Object], params: Refin
     global current
     stop()
     body = characters.read(obj)
-    live = Live(body, body.refiner(params))
+    live = Live(identity.of(obj), body, body.refiner(params))
     for garment in garments:
         if tuple(map(tuple, garment.matrix_world)) != tuple(map(tuple, obj.matrix_world)):
             raise SceneError(f"{garment.name} is moved, turned or scaled against {obj.name}: apply both transforms")
-        live.garments.append(follow(body, characters.read(garment), np.eye(4)))
+        live.garments.append((identity.of(garment), follow(body, characters.read(garment), np.eye(4))))
     try:
         for shown in (obj, *garments):
             preview_object.show(shown)
@@ -64,8 +66,8 @@ def update() -> bool:
     live = current
     if live is None:
         return False
-    obj, rig = bpy.data.objects.get(live.body.name), bpy.data.objects.get(live.body.rig)
-    if obj is None or rig is None or len(obj.data.vertices) != len(live.body.positions):
+    obj = live.object.find()
+    if obj is None or armature.find(obj) is None or len(obj.data.vertices) != len(live.body.positions):
         raise SceneError(_lost(live))
     pose = characters.pose(obj, live.body)
     if live.pose is not None and np.array_equal(pose, live.pose):
@@ -84,8 +86,8 @@ def _lost(live: Live) -> str:
 
 def _move_garments(live: Live, pose: NDArray[np.float64], refined: NDArray[np.float32]) -> None:
     displacement = refined - live.body.skinned(pose)
-    for follower in live.garments:
-        garment = bpy.data.objects.get(follower.character.name)
+    for found, follower in live.garments:
+        garment = found.find()
         if garment is not None:
             own = characters.pose(garment, follower.character)
             preview_object.place(garment.name, follower.positions(own, displacement))
@@ -96,10 +98,10 @@ def restart() -> None:
     if current is None:
         return
     current.pose = None
-    for name in (current.body.name, *(follower.character.name for follower in current.garments)):
-        obj = bpy.data.objects.get(name)
+    for shown in (current.object, *(garment for garment, _ in current.garments)):
+        obj = shown.find()
         if obj is None:
             raise SceneError(_lost(current))
-        if preview_object.of(name) is None:
+        if preview_object.of(obj.name) is None:
             preview_object.show(obj)
     update()

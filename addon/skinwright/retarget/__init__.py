@@ -7,6 +7,7 @@ import bpy
 
 from .. import jobs
 from ..jobs import Jobs
+from ..scene import editable
 from ..scene.watched import Watched
 from .compute import compute
 from .inputs import by_character, match_bones, read_pair, rest_bones_of
@@ -52,6 +53,7 @@ def steps(
     `map_of` returns the given bone map of a target's armature; without it `params` has that of all.
     """
     targets = list(dict.fromkeys(targets))  # one named twice is one
+    editable.check_separate(targets)
     pairs = []
     for rig, meshes in by_character(targets):
         others = {obj.name for obj in targets} - {obj.name for obj in meshes}

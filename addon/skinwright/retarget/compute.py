@@ -4,21 +4,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .. import native, soundness
+from .. import csr, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..jobs import Jobs
+from ..transfer import merging
 from .inputs import Character, Pair
 from .params import RetargetParams
 
 
 @dataclass(frozen=True)
 class Result:
-    """The library's answer, and its rows over the target's bones."""
+    """The library's answer, its rows over the target's bones, and (V,) the vertices that have one.
+
+    Columns of locked groups are empty, and the others fill what these leave of 1.
+    """
 
     retarget: Any
     rows: Rows
+    written: NDArray[np.bool_]
 
 
 def compute(pair: Pair, params: RetargetParams) -> Jobs[Result]:
@@ -34,7 +40,21 @@ def compute(pair: Pair, params: RetargetParams) -> Jobs[Result]:
     )
     soundness.check(name, rows)
     soundness.check_sums(name, rows, np.ones(len(pair.target.bones.names), bool), least=1.0)
-    return Result(retarget, rows)
+    merged = _beside_locked(pair, rows, params)
+    soundness.check_sums(name, merged, np.ones(len(pair.target.bones.names), bool))
+    return Result(retarget, merged, np.diff(rows.indptr) > 0)
+
+
+def _beside_locked(pair: Pair, rows: Rows, params: RetargetParams) -> Rows:
+    """Mesh by mesh, as each has locks of its own."""
+    if not pair.held.any():
+        return rows
+    starts, parts = pair.target.starts, []
+    every, limit = np.ones(pair.held.shape[1], bool), params.max_influences
+    for held, before, start, end in zip(pair.held, pair.before, starts, starts[1:], strict=False):
+        new = csr.take_rows(rows, np.arange(start, end, dtype=np.int64))
+        parts.append(merging.merge(new, before, held=held, chosen=every, factor=1.0, max_influences=limit))
+    return csr.concatenated(parts)
 
 
 def _arrays(character: Character) -> tuple[Any, ...]:

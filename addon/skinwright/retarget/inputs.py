@@ -12,6 +12,7 @@ from ..csr import Rows
 from ..scene import armature, editable, landmarks, mesh, rest_bones, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
+from ..transfer import merging
 from . import bone_map
 from .bone_map import BoneMatch
 from .params import RetargetParams
@@ -31,13 +32,19 @@ class Character:
 
 @dataclass(frozen=True)
 class Pair:
-    """Both characters, the source's rows over its bones, the match of each bone of the target, and landmarks (L, 2)."""
+    """Both characters, the source's rows over its bones, the match of each bone of the target, and landmarks (L, 2).
+
+    `held` (M, B) marks of each mesh of the target the bones whose groups are locked; `before` (M) are the rows of such
+    a mesh as they are, empty ones of the others.
+    """
 
     source: Character
     target: Character
     rows: Rows
     matches: list[BoneMatch]
     landmarks: NDArray[np.uint32]
+    held: NDArray[np.bool_]
+    before: list[Rows]
 
     @property
     def bone_map(self) -> NDArray[np.int64]:
@@ -60,6 +67,7 @@ def read_pair(
         )
     for obj in targets:
         editable.check(obj)
+    editable.check_separate(targets, giver.meshes)
     rows = _rows(giver)
     matches = match_bones(giver.bones, taker.bones, params)
     if not any(entry.source for entry in matches):
@@ -67,7 +75,7 @@ def read_pair(
             f"No deforming bone of {taker.armature.name} has a partner in {giver.armature.name}: "
             "pair at least one in the bone map"
         )
-    return Pair(giver, taker, rows, matches, _landmarks(giver, taker, params))
+    return Pair(giver, taker, rows, matches, _landmarks(giver, taker, params), *_locked(taker))
 
 
 def match_bones(source: RestBones, target: RestBones, params: RetargetParams) -> list[BoneMatch]:
@@ -127,14 +135,7 @@ def joined(parts: list[mesh.Geometry]) -> tuple[NDArray[np.float32], NDArray[np.
 
 def joined_rows(meshes: Sequence[bpy.types.Object], names: Sequence[str]) -> Rows:
     """The rows of all meshes over the groups `names`, one after another."""
-    parts = [vertex_groups.read(obj, names) for obj in meshes]
-    offsets = np.cumsum([0, *(len(part.bones) for part in parts)], dtype=np.int64)
-    indptr = [part.indptr[1:] + np.uint32(start) for part, start in zip(parts, offsets, strict=False)]
-    return Rows(
-        np.concatenate([np.zeros(1, np.uint32), *indptr]),
-        np.concatenate([part.bones for part in parts]),
-        np.concatenate([part.values for part in parts]),
-    )
+    return csr.concatenated([vertex_groups.read(obj, names) for obj in meshes])
 
 
 def _rows(source: Character) -> Rows:
@@ -143,6 +144,22 @@ def _rows(source: Character) -> Rows:
         names = ", ".join(obj.name for obj in source.meshes)
         raise SceneError(f"{names}: no vertex follows a deforming bone of {source.armature.name}; paint weights first")
     return rows
+
+
+def _locked(target: Character) -> tuple[NDArray[np.bool_], list[Rows]]:
+    """`Pair.held` and `Pair.before`. Raises SceneError where locked groups sum to more than 1."""
+    names = target.bones.names
+    held = np.array([np.isin(names, sorted(vertex_groups.locked(obj))) for obj in target.meshes])
+    before = []
+    for obj, locked in zip(target.meshes, held, strict=True):
+        before.append(vertex_groups.read(obj, names if locked.any() else []))
+        overfull = merging.overfull(before[-1], locked)
+        if overfull.size:
+            raise SceneError(
+                f"The locked groups of {obj.name} sum to more than 1 at {overfull.size} vertices, "
+                f"the first is vertex {overfull[0]}: unlock one of them or normalise them"
+            )
+    return held, before
 
 
 def _landmarks(source: Character, target: Character, params: RetargetParams) -> NDArray[np.uint32]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import csr
-from ..scene import attributes, object_state, vertex_groups
+from ..scene import attributes, editable, object_state, vertex_groups
 from .compute import Result
 from .inputs import Character, Pair
 from .params import RetargetParams
@@ -37,8 +37,8 @@ def write(
 
 def _write_character(pair: Pair, result: Result) -> RetargetReport:
     warnings = _warnings(pair, result)
-    for obj, start, end in _parts(pair.target):
-        warnings += _write_mesh(pair, obj, csr.take_rows(result.rows, np.arange(start, end, dtype=np.int64)))
+    for (obj, start, end), held in zip(_parts(pair.target), pair.held, strict=True):
+        warnings += _write_mesh(pair, result, obj, held, np.arange(start, end, dtype=np.int64))
     return _report(pair, result, warnings)
 
 
@@ -46,20 +46,25 @@ def _parts(character: Character) -> list[tuple[bpy.types.Object, int, int]]:
     return list(zip(character.meshes, character.starts[:-1], character.starts[1:], strict=True))
 
 
-def _write_mesh(pair: Pair, obj: bpy.types.Object, rows: csr.Rows) -> list[str]:
-    names = pair.target.bones.names
-    locks = vertex_groups.locked(obj)
+def _write_mesh(
+    pair: Pair, result: Result, obj: bpy.types.Object, held: NDArray[np.bool_], mine: NDArray[np.int64]
+) -> list[str]:
+    names, vertices = pair.target.bones.names, np.flatnonzero(result.written[mine])
+    rows = csr.take_rows(result.rows, mine[vertices])
     present = {group.name for group in obj.vertex_groups}
     used = np.bincount(rows.bones, minlength=len(names)) > 0
-    written = np.array([name not in locks for name in names], bool)
-    written &= used | np.array([name in present for name in names], bool)
+    written = ~held & (used | np.array([name in present for name in names], bool))
     kept = [name for name, is_written in zip(names, written, strict=True) if is_written]
-    vertices = np.flatnonzero(np.diff(rows.indptr) > 0)
-    vertex_groups.write(obj, kept, csr.take_rows(csr.take_columns(rows, written), vertices), vertices)
-    locked = sorted(locks & set(names))
-    if not locked:
-        return []
-    return [f"{obj.name}: locked groups were left as they are, so weights may not sum to 1: {_listed(locked)}"]
+    vertex_groups.write(obj, kept, csr.take_columns(rows, written), vertices)
+    warnings = [editable.changes_others(obj)]
+    short = csr.row_sums(vertex_groups.read(obj, names))[vertices] < 1 - 1e-3 if held.any() else np.zeros(0, bool)
+    if short.any():
+        locked = _listed([name for name, is_held in zip(names, held, strict=True) if is_held])
+        warnings.append(
+            f"The weights of {int(short.sum())} vertices of {obj.name} sum to less than 1, as they would follow "
+            f"locked groups: unlock {locked}"
+        )
+    return [warning for warning in warnings if warning]
 
 
 def _warnings(pair: Pair, result: Result) -> list[str]:

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 # Two diagonals are as good as each other if the sines of the angles that they face differ by less: both give the same
 # Laplacian then.
 _TIE = 1e-6
+_FOUR = np.arange(4, dtype=np.int64)
+# Quads looked at together: their arrays stay in the processor's cache.
+_AT_A_TIME = 8192
 
 
 @dataclass(frozen=True)
@@ -49,14 +52,19 @@ def triangulated(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> tuple[
     quad = np.flatnonzero(np.diff(start, append=len(corners)) == 4)
     if not quad.size:
         return blenders_triangles(mesh), no_quads()
-    around = corners[start[quad].astype(np.int64)[:, None] + np.arange(4, dtype=np.int64)].astype(np.uint32)
+    is_all = len(quad) == len(start)
+    around = corners.reshape(-1, 4) if is_all else corners[start[quad].astype(np.int64)[:, None] + _FOUR]
+    around = around.astype(np.uint32)
     other, convex = _cuts(positions, around)
     first = start[quad].astype(np.int64) - 2 * quad  # n corners make n - 2 triangles
-    is_all = len(quad) == len(start)
-    triangles = np.empty((2 * len(quad), 3), np.uint32) if is_all else blenders_triangles(mesh)
+    quads = Quads(around[convex], first[convex])
     turned = np.where(other[:, None], np.roll(around, -1, axis=1), around)
-    triangles[first], triangles[first + 1] = turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]
-    return triangles, Quads(around[convex], first[convex])
+    halves = turned[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 2, 3)
+    if is_all:
+        return halves.reshape(-1, 3), quads
+    triangles = blenders_triangles(mesh)
+    triangles[first], triangles[first + 1] = halves[:, 0], halves[:, 1]
+    return triangles, quads
 
 
 def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32] | None:
@@ -69,9 +77,32 @@ def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32] | None:
     return corners
 
 
+def stored(
+    mesh: bpy.types.Mesh, name: str, elements: bpy.types.bpy_prop_collection, property_name: str, size: int = 1
+) -> NDArray[np.int32]:
+    """(n size,) integers of all elements: the attribute is copied at once, the property is asked of one by one.
+
+    The attribute is missing in Edit mode.
+    """
+    values = np.empty(len(elements) * size, np.int32)
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        elements.foreach_get(property_name, values)
+    else:
+        attribute.data.foreach_get("value", values)
+    return values
+
+
 def _cuts(positions: NDArray[np.float32], around: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(Q,) whether each quad is cut from its second corner instead of its first, and whether it is convex."""
     axes = np.ascontiguousarray(positions.T, np.float64)
+    parts = [_cuts_of_some(axes, around[at : at + _AT_A_TIME]) for at in range(0, len(around), _AT_A_TIME)]
+    other, convex = zip(*parts, strict=True)
+    return np.concatenate(other), np.concatenate(convex)
+
+
+def _cuts_of_some(axes: NDArray[np.float64], around: NDArray[np.uint32]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The same of a few, whose vertices have the coordinates `axes` (3, V)."""
     place = [axes[:, np.ascontiguousarray(around[:, k])] for k in range(4)]
     edge = [place[(k + 1) % 4] - place[k] for k in range(4)]
     normal = [_cross(edge[k - 1], edge[k]) for k in range(4)]

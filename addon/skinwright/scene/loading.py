@@ -1,6 +1,10 @@
 """Objects from files: .blend files are appended, the others imported by Blender's own importers."""
 
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import unquote
 
 import bpy
 
@@ -24,6 +28,32 @@ def load(path: Path) -> list[bpy.types.Object]:
     except (RuntimeError, OSError) as error:
         raise SceneError(f"{path} cannot be read: {error}") from error
     return sorted(set(bpy.data.objects) - before, key=lambda obj: obj.name)
+
+
+@contextmanager
+def names_set_free(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """What is loaded in the block keeps the names it has in its file, also those that `objects` have."""
+    names = [obj.name for obj in objects]
+    for obj in objects:
+        obj.name = f"{obj.name} (set aside)"
+    try:
+        yield
+    finally:
+        for obj, name in zip(objects, names, strict=True):
+            obj.name = name
+
+
+def depends(*paths: Path) -> list[Path]:
+    """The files that those which have been loaded are made of too: buffers of glTF, libraries of .blend files."""
+    buffers = [buffer for path in paths if path.suffix.lower() == ".gltf" for buffer in _buffers(path)]
+    libraries = [Path(bpy.path.abspath(library.filepath)) for library in bpy.data.libraries]
+    found = dict.fromkeys(path.resolve() for path in (*buffers, *libraries))
+    return sorted(path for path in found if path not in paths)
+
+
+def _buffers(path: Path) -> list[Path]:
+    names = [buffer.get("uri", "data:") for buffer in json.loads(path.read_text(encoding="utf-8")).get("buffers", [])]
+    return [path.parent / unquote(name) for name in names if not name.startswith("data:")]
 
 
 def _append(path: Path) -> None:

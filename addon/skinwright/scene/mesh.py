@@ -112,16 +112,22 @@ def active_vertex(obj: bpy.types.Object) -> int | None:
 
 def edges(obj: bpy.types.Object) -> NDArray[np.int32]:
     """(E, 2) vertices of the edges."""
-    vertices = np.empty(len(obj.data.edges) * 2, np.int32)
-    obj.data.edges.foreach_get("vertices", vertices)
-    return vertices.reshape(-1, 2)
+    return _ends(obj.data)
 
 
 def border(obj: bpy.types.Object) -> NDArray[np.int32]:
     """(E, 2) the edges of exactly one face."""
-    used = np.empty(len(obj.data.loops), np.int32)
-    obj.data.loops.foreach_get("edge_index", used)
-    return edges(obj)[np.bincount(used, minlength=len(obj.data.edges)) == 1]
+    return _ends(obj.data)[np.bincount(_sides(obj.data), minlength=len(obj.data.edges)) == 1]
+
+
+def _ends(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(E, 2) vertices of the edges."""
+    return faces.stored(mesh, ".edge_verts", mesh.edges, "vertices", 2).reshape(-1, 2)
+
+
+def _sides(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """(L,) the edge after each corner of the faces."""
+    return faces.stored(mesh, ".corner_edge", mesh.loops, "edge_index")
 
 
 def select(obj: bpy.types.Object, chosen: NDArray[np.bool_]) -> None:
@@ -236,12 +242,9 @@ def _check_connected(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
 
 def wires_of(mesh: bpy.types.Mesh) -> NDArray[np.uint32]:
     """(E, 2) the edges of no face."""
-    vertices, loose = np.empty(len(mesh.edges) * 2, np.int32), np.empty(len(mesh.edges), bool)
-    mesh.edges.foreach_get("is_loose", loose)
-    if not loose.any():
-        return np.empty((0, 2), np.uint32)
-    mesh.edges.foreach_get("vertices", vertices)
-    return vertices.reshape(-1, 2)[loose].astype(np.uint32)
+    loose = np.ones(len(mesh.edges), bool)
+    loose[_sides(mesh)] = False
+    return _ends(mesh)[loose].astype(np.uint32) if loose.any() else np.empty((0, 2), np.uint32)
 
 
 def check_faces(obj: bpy.types.Object, geometry: Geometry) -> None:

@@ -4,9 +4,12 @@ from pathlib import Path
 
 import bpy
 
+from . import modifiers
 from .error import SceneError
 
 NAME = "Refined Cache"
+# Of an object: the file that was baked for it last.
+_BAKED = "skinwright_refined_cache"
 
 
 def check(obj: bpy.types.Object) -> None:
@@ -14,18 +17,31 @@ def check(obj: bpy.types.Object) -> None:
     if obj.library or obj.data.library:
         raise SceneError(f"{obj.name} is linked from another file: make it local before a modifier is added")
     before = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE"), 0)
-    changing = [m.name for m in list(obj.modifiers)[:before] if m.type in {"SUBSURF", "MIRROR", "ARRAY", "BEVEL"}]
+    used = [m for m in list(obj.modifiers)[:before] if m.show_viewport or m.show_render]
+    changing = [m.name for m in used if not modifiers.keeps_vertices(m) and m.type not in ("NODES", "TRIANGULATE")]
     if changing:
         raise SceneError(
             f"{obj.name} has {changing[0]} before its armature, which changes the vertices: apply it first"
         )
 
 
+def is_own(obj: bpy.types.Object, path: Path) -> bool:
+    """Whether baking may replace this file, as it was baked for `obj`. Raises SceneError if another object plays it."""
+    for other in bpy.data.objects:
+        if other != obj and any(m.type == "MESH_CACHE" and _is(m.filepath, path) for m in other.modifiers):
+            raise SceneError(f"{path} is played by {other.name}: give the cache of {obj.name} another name")
+    return _is(obj.get(_BAKED, ""), path)
+
+
+def _is(stored: str, path: Path) -> bool:
+    return bool(stored) and Path(bpy.path.abspath(stored)).resolve() == path.resolve()
+
+
 def play(obj: bpy.types.Object, path: Path, kind: str, first: int) -> None:
     """Add or update the modifier, right after the armature; what comes later still applies."""
     modifier = obj.modifiers.get(NAME) or obj.modifiers.new(NAME, "MESH_CACHE")
     modifier.cache_format = kind.upper()
-    modifier.filepath = str(path)
+    modifier.filepath = obj[_BAKED] = str(path)
     modifier.frame_start = float(first)
     modifier.deform_mode, modifier.interpolation = "OVERWRITE", "LINEAR"
     # Blender's own axes: nothing is turned.

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from . import armature as scene_armature
 from .error import SceneError
 
+# Blender shows no frame beyond these, in both directions: it stays there.
+LAST_FRAME = 1_048_574
 _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
 

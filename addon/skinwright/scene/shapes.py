@@ -99,6 +99,22 @@ def read_target(obj: bpy.types.Object, look: Look) -> Shape:
         return Shape(geometry, np.array(shown.matrix_world), unseen)
 
 
+def before_the_pose(obj: bpy.types.Object) -> NDArray[np.float32]:
+    """(V, 3) local positions that the armature deforms: by shape keys in use and the modifiers before it, at rest.
+
+    Modifiers that make other vertices are left out. Raises SceneError if Geometry Nodes do.
+    """
+    place = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE" and m.show_viewport), 0)
+    if not keys_in_use(obj) and not any(m.show_viewport and modifiers.moves(m) for m in list(obj.modifiers)[:place]):
+        return mesh.rest_positions(obj.data)
+    with looked_at([obj], "AS_SHOWN"), _evaluable(obj) as shown:
+        before = [m for m in list(shown.modifiers)[:place] if modifiers.keeps_vertices(m) or m.type == "NODES"]
+        local = _positions_without(shown, [m for m in shown.modifiers if m not in before])
+    if len(local) != len(obj.data.vertices):
+        raise SceneError(f"{obj.name} has Geometry Nodes before its armature, which make other vertices: apply them")
+    return local
+
+
 def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: list[str]) -> Rows:
     """What this modifier alone leaves of the mesh's weights in the groups `names`."""
     place = list(obj.modifiers).index(modifier)

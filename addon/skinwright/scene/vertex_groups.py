@@ -68,7 +68,10 @@ def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], na
     indices = [index.get(_stored(name), -1) for name in names]
     if all(i < 0 for i in indices):
         return csr.empty(n)
-    held = _memberships(mesh, np.arange(n, dtype=np.int64))
+    everything = np.arange(n, dtype=np.int64)
+    if len(names) == 1 and (array := deform_array.open_array(mesh, everything)):
+        return _read_one(obj, names, array, indices[0])
+    held = _memberships(mesh, everything)
     column = _lookup(indices, held.group)
     keep = column >= 0
     vertex, column, values = held.row[keep], column[keep], held.values[keep]
@@ -76,6 +79,17 @@ def _read(obj: bpy.types.Object, mesh: bpy.types.Mesh, index: dict[str, int], na
     order = np.argsort(vertex * len(names) + column, kind="stable")
     indptr = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=n), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), column[order].astype(np.uint32), values[order])
+
+
+def _read_one(obj: bpy.types.Object, names: Sequence[str], array: deform_array.DeformArray, index: int) -> Rows:
+    """The same for one group, which a stroke of a brush waits for: other groups' weights are not touched."""
+    entry = np.flatnonzero(array.groups() == index)
+    vertex = np.searchsorted(array.indptr, entry, side="right") - 1
+    values = array.memory["weight"][array.entries[entry]]
+    column = np.zeros(len(entry), np.int64)
+    _check_finite(obj, names, vertex, column, values)
+    indptr = np.searchsorted(entry, array.indptr)
+    return Rows(indptr.astype(np.uint32), column.astype(np.uint32), values)
 
 
 def values(obj: bpy.types.Object, name: str) -> NDArray[np.float32]:
@@ -98,10 +112,15 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
     row, group = np.repeat(np.arange(len(indices), dtype=np.int64), np.diff(rows.indptr)), owned[rows.bones]
     held = _memberships(mesh, indices)
-    if _change_members(obj, indices, held, owned, row, group):
+    if not _are_members(held, row, group) and _change_members(obj, indices, held, owned, row, group):
         held = _memberships(mesh, indices)
     _set_weights(mesh, indices, held, row, group, rows.values)
     mesh.update()
+
+
+def _are_members(held: Memberships, row: NDArray[np.int64], group: NDArray[np.int64]) -> bool:
+    """Whether memberships are those that are there already, without others: as after a first transfer."""
+    return np.array_equal(held.row, row) and np.array_equal(held.group, group)
 
 
 def _change_members(
@@ -141,9 +160,18 @@ def ensure(obj: bpy.types.Object, names: Sequence[str]) -> list[bpy.types.Vertex
     return groups
 
 
+def check_names(obj: bpy.types.Object, names: Sequence[str]) -> None:
+    """Raise SceneError for a name that a group cannot have."""
+    bad = [name for name in names if not name or "\0" in name or _stored(name) != name]
+    if bad:
+        raise SceneError(
+            f"{obj.name} cannot have a group called {bad[0]!r}: rename it, to {_NAME_BYTES} bytes of text at most"
+        )
+
+
 def _stored(name: str) -> str:
     """The name as Blender stores it."""
-    return name.encode()[:_NAME_BYTES].decode(errors="ignore")
+    return name.encode(errors="ignore")[:_NAME_BYTES].decode(errors="ignore")
 
 
 def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
@@ -179,8 +207,8 @@ def _set_weights(
     values: NDArray[np.float32],
 ) -> None:
     """Give memberships that exist already, (row in `indices`, group), their values."""
-    if np.array_equal(held.row, row) and np.array_equal(held.group, group):
-        now = values  # a garment without other groups, as it is after the first transfer
+    if _are_members(held, row, group):
+        now = values
     else:
         order = np.argsort(_keys(row, group), kind="stable")
         position, found = _find(_keys(row, group)[order], _keys(held.row, held.group))

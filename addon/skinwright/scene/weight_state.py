@@ -36,15 +36,18 @@ def capture(obj: bpy.types.Object) -> WeightState:
     """The state of an object; not in Edit mode."""
     n = len(obj.data.vertices)
     held = _memberships(obj.data, np.arange(n, dtype=np.int64))
-    known = held.group < len(obj.vertex_groups)  # a mesh may hold indices beyond its object's list
-    counts = np.bincount(held.row[known], minlength=n)
+    row, groups, values = held.row, held.group, held.values
+    known = groups < len(obj.vertex_groups)  # a mesh may hold indices beyond its object's list
+    if not known.all():
+        row, groups, values = row[known], groups[known], values[known]
+    counts = np.bincount(row, minlength=n)
     return WeightState(
         names=[group.name for group in obj.vertex_groups],
         locked=[group.lock_weight for group in obj.vertex_groups],
         active=obj.vertex_groups.active.name if obj.vertex_groups.active else "",
         indptr=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.uint32),
-        groups=held.group[known].astype(np.uint32),
-        values=held.values[known].copy(),
+        groups=groups.astype(np.uint32),
+        values=values,
     )
 
 

@@ -47,8 +47,10 @@ def _problem(sculpts: Sculpts) -> str:
         if name in sculpts and sculpts[name].dtype.kind not in kinds:
             return f"`{name}` is of the type {sculpts[name].dtype}, which cannot be used"
     count = len(sculpts["positions"])
+    if np.isinf(sculpts["positions"]).any():
+        return "`positions` holds infinite numbers: NaN marks what was not touched"
     if "frames" in sculpts:
-        return "" if sculpts["frames"].shape == (count,) else f"`frames` must have shape ({count},)"
+        return _problem_of_frames(sculpts["frames"], count)
     if "bones" not in sculpts or "matrices" not in sculpts:
         return "it needs `frames`, or `bones` and `matrices`, to say in which pose was sculpted"
     if sculpts["bones"].ndim != 1:
@@ -56,7 +58,18 @@ def _problem(sculpts: Sculpts) -> str:
     expected = (count, len(sculpts["bones"]), 4, 4)
     if sculpts["matrices"].shape != expected:
         return f"`matrices` must have shape {expected}"
-    return "" if np.isfinite(sculpts["matrices"]).all() else "`matrices` must be finite numbers"
+    if len(set(sculpts["bones"].tolist())) != len(sculpts["bones"]):
+        return "`bones` names a bone twice"
+    if not np.isfinite(sculpts["matrices"]).all():
+        return "`matrices` must be finite numbers"
+    return "" if (sculpts["matrices"][..., 3, :] == (0, 0, 0, 1)).all() else "`matrices` must end in the row 0, 0, 0, 1"
+
+
+def _problem_of_frames(frames: NDArray, count: int) -> str:
+    if frames.shape != (count,):
+        return f"`frames` must have shape ({count},)"
+    beyond = [frame for frame in frames.tolist() if abs(frame) > poses.LAST_FRAME]
+    return f"there is no frame {beyond[0]}, only up to {poses.LAST_FRAME}" if beyond else ""
 
 
 def replay(obj: bpy.types.Object, sculpts: Sculpts, options: SculptParams) -> SculptReport:

@@ -14,6 +14,10 @@ def write(path: Path, kept: Record, *, overwrite: bool = False, others: Iterable
     """Write a record whole. Raises FileError or OSError."""
     ending = _ending(path)
     files.check_output(path, others=others, overwrite=overwrite)
+    try:
+        record.check(kept)
+    except record.RecordError as error:
+        raise record.RecordError(f"{kept.object}: {error}") from error
     content = record.to_npz(kept) if ending == ".npz" else record.to_json(kept).encode()
     files.write_whole(path, content)
 
@@ -22,14 +26,16 @@ def read(path: Path) -> Record:
     """Read a record. Raises RecordError, FileError or OSError."""
     ending = _ending(path)
     try:
-        return record.from_npz(path.read_bytes()) if ending == ".npz" else record.from_json(_text(path))
+        kept = record.from_npz(path.read_bytes()) if ending == ".npz" else record.from_json(_text(path))
+        record.check(kept)
+        return kept
     except record.RecordError as error:
         raise record.RecordError(f"{path}: {error}") from error
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise record.RecordError(f"it is not a text ({error})") from error
 

@@ -5,6 +5,7 @@ import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import get_type_hints
 
 import bpy
 import numpy as np
@@ -37,11 +38,14 @@ class Entry:
 
 
 def entries(obj: bpy.types.Object) -> list[Entry]:
-    """Those of an object, oldest first. An index that cannot be read counts as none."""
+    """Those of an object, oldest first. An index that cannot be read counts as none; what a later version has added
+    to an entry does not hinder."""
+    kinds = get_type_hints(Entry)
     try:
-        return [Entry(**entry) for entry in json.loads(kept_bytes.read(obj.data, _INDEX) or b"[]")]
-    except (ValueError, TypeError):
+        found = [{name: entry[name] for name in kinds} for entry in json.loads(kept_bytes.read(obj.data, _INDEX))]
+    except (ValueError, TypeError, KeyError, RecursionError):
         return []
+    return [Entry(**entry) for entry in found if all(isinstance(entry[name], kinds[name]) for name in kinds)]
 
 
 def take(obj: bpy.types.Object) -> Record:

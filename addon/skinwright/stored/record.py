@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Refused
+from ..soundness import SUM_TOLERANCE
 
 FORMAT, VERSION = "skinwright weights", 1
 # Of each array: type and number of dimensions.
@@ -116,14 +117,39 @@ def from_json(text: str) -> Record:
         counts = [len(members) for members in vertices]
         arrays = {
             "indptr": np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]),
-            "groups": np.array([member[0] for members in vertices for member in members], np.int64),
-            "values": np.array([member[1] for members in vertices for member in members], np.float32),
-            "positions": np.array(content["positions"], np.float32).reshape(-1, 3),
-            "triangles": np.array(content["triangles"], np.int64).reshape(-1, 3),
+            "groups": _numbers([group for members in vertices for group, _ in members], np.uint32),
+            "values": _numbers([weight for members in vertices for _, weight in members], np.float32),
+            "positions": _numbers(content["positions"], np.float32, columns=3),
+            "triangles": _numbers(content["triangles"], np.uint32, columns=3),
         }
     except Exception as error:
         raise RecordError(f"it cannot be read as weights of Skinwright ({error})") from error
     return build(content, arrays)
+
+
+def _numbers(values: list, kind: type, columns: int = 0) -> NDArray:
+    """An array of the type that the values have, which is looked at later: none is rounded or read from a text."""
+    if values:
+        found = np.array(values)
+        return found.astype(kind) if kind is np.float32 and found.dtype.kind in "iu" else found
+    return np.zeros((0, columns) if columns else 0, kind)
+
+
+def check(record: Record) -> None:
+    """Raise RecordError for what no file may hold: weights or coordinates that are none."""
+    with np.errstate(invalid="ignore"):
+        good = (record.values >= 0) & (record.values <= 1 + SUM_TOLERANCE)  # not a number is neither
+    if not good.all():
+        entry = int(np.flatnonzero(~good)[0])
+        vertex = int(np.searchsorted(record.indptr, entry, side="right")) - 1
+        name = record.names[record.groups[entry]]
+        raise RecordError(
+            f"the weight of vertex {vertex} in group {name} is {record.values[entry]}, but must be a number from 0 to "
+            "1: assign it again"
+        )
+    bad = np.flatnonzero(~np.isfinite(record.positions).all(axis=1))
+    if bad.size:
+        raise RecordError(f"vertex {bad[0]} has a coordinate that is not a number: move or delete it")
 
 
 def build(header: Any, arrays: dict[str, NDArray]) -> Record:
@@ -131,7 +157,8 @@ def build(header: Any, arrays: dict[str, NDArray]) -> Record:
     problem = _problem_of_header(header) or _problem_of_arrays(header, arrays)
     if problem:
         raise RecordError(problem)
-    typed: dict[str, Any] = {name: np.ascontiguousarray(arrays[name], kind) for name, (kind, _) in ARRAYS.items()}
+    with np.errstate(over="ignore"):  # what is too large is looked for in files
+        typed: dict[str, Any] = {name: np.ascontiguousarray(arrays[name], kind) for name, (kind, _) in ARRAYS.items()}
     return Record(header["object"], header["names"], header["locked"], header["active"], **typed)
 
 
@@ -171,6 +198,8 @@ def _problem_of_arrays(header: dict[str, Any], arrays: dict[str, NDArray]) -> st
         return "its rows do not fit its entries"
     if groups.size and not (groups.min() >= 0 and groups.max() < len(header["names"])):
         return "a member is in a group that it does not name"
+    if len(np.unique(np.repeat(np.arange(n, dtype=np.int64), np.diff(indptr)) << 32 | groups)) != len(groups):
+        return "a vertex is in a group twice"
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < n):
         return "a triangle names a vertex that is not there"
     return ""

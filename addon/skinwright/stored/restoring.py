@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
-from ..scene import editable, mesh, object_state, weight_state
+from ..scene import editable, mesh, object_state, vertex_groups, weight_state
 from ..scene.weight_state import WeightState
 from ..transfer import scalar_fields
 from .record import Record
@@ -44,6 +44,7 @@ def restore(
 ) -> Aligned:
     """Make a state the weights of an object. Raises SceneError and native.NativeError; then nothing has changed."""
     editable.check(obj)
+    vertex_groups.check_names(obj, kept.names)
     aligned = align(obj, kept, threads)
     if before_write:
         before_write([obj])
@@ -54,11 +55,11 @@ def restore(
 
 def align(obj: bpy.types.Object, kept: Record, threads: int = 0) -> Aligned:
     """The state as it would be on the mesh as it is now."""
-    n = len(obj.data.vertices)
-    if n == len(kept.positions) and np.array_equal(_triangles(obj), kept.triangles):
+    n, positions = len(obj.data.vertices), mesh.rest_positions(obj.data)
+    same = n == len(kept.positions) and np.array_equal(_triangles(obj), kept.triangles)
+    if same and not _loose_are_shuffled(positions, kept):
         state = WeightState(kept.names, kept.locked, kept.active, kept.indptr, kept.groups, kept.values)
         return Aligned(state, np.ones(n, bool), exact=True)
-    positions = mesh.rest_positions(obj.data)
     partner = partners(positions, kept.positions)
     rows = Rows(kept.indptr, kept.groups, kept.values)
     found = partner >= 0
@@ -68,6 +69,15 @@ def align(obj: bpy.types.Object, kept: Record, threads: int = 0) -> Aligned:
         rows = _merged(csr.take_rows(rows, partner[found]), _inpainted(obj, kept, found, threads), found)
     state = WeightState(kept.names, kept.locked, kept.active, rows.indptr, rows.bones, rows.values)
     return Aligned(state, found, exact=False)
+
+
+def _loose_are_shuffled(positions: NDArray[np.float32], kept: Record) -> bool:
+    """Whether the vertices of no face, whose order no face tells, are where they were but in another order."""
+    loose = np.setdiff1d(np.arange(len(positions), dtype=np.int64), kept.triangles)
+    if np.array_equal(positions[loose], kept.positions[loose]):
+        return False
+    partner = partners(positions[loose], kept.positions[loose])
+    return bool((partner >= 0).all() and (partner != np.arange(len(loose), dtype=np.int64)).any())
 
 
 def _triangles(obj: bpy.types.Object) -> NDArray[np.uint32]:

@@ -44,6 +44,7 @@ def steps(
     before_write: BeforeWrite | None = None,
 ) -> jobs.Jobs[Report]:
     """The same as a generator of jobs, for a window that must live on meanwhile."""
+    targets = list(dict.fromkeys(targets))  # one named twice is one
     check_source(source, targets)
     with mesh.object_mode(context):
         body = read_body(source, params, targets)

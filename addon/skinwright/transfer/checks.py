@@ -37,11 +37,7 @@ def target_problem(
         return f"{target.name} is not a mesh: deselect it or convert it"
     if lost := editable.problem(target):
         return lost
-    if not params.make_single_user:
-        for other in (source, *targets):
-            if other.data == target.data and other != target:
-                return f"{other.name} and {target.name} share one mesh and so its weights: make it single-user first"
-    return ""
+    return "" if params.make_single_user else editable.shared(target, (source, *targets))
 
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
@@ -195,7 +191,4 @@ def _other_bones(body: Body, garment: Garment, params: TransferParams) -> str:
 
 
 def _sharing(garment: Garment, params: TransferParams) -> str:
-    others = mesh.other_users(garment.object)
-    if not others or params.make_single_user:
-        return ""
-    return f"{garment.object.name} shares its mesh with {', '.join(others)}, whose weights changed too"
+    return "" if params.make_single_user else editable.changes_others(garment.object)

@@ -156,19 +156,21 @@ def to_result(body: Body, garment: Garment, answer: Answer, names: list[str], ro
     return Result(answer.matched, report, names, csr.take_columns(rows, wanted), written, seconds)
 
 
-def bone_rows(prepared: Prepared, garment: Garment, params: TransferParams) -> Jobs[tuple[Answer, Rows]]:
-    """The library's answer for one target and the rows over `garment.names`; its mask counts."""
-    answers, rows = yield from _bone_rows(prepared, [garment.mask], params)
+def bone_rows(
+    prepared: Prepared, garment: Garment, params: TransferParams, near: bool = False
+) -> Jobs[tuple[Answer, Rows]]:
+    """The library's answer for one target and the rows over `garment.names`; its mask counts. `near`: see Prepared."""
+    answers, rows = yield from _bone_rows(prepared, [garment.mask], params, near)
     return answers[0], rows[0]
 
 
 def _bone_rows(
-    prepared: Prepared, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams
+    prepared: Prepared, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, near: bool = False
 ) -> Jobs[tuple[list[Answer], list[Rows]]]:
     joined = any(_joins_old_weights(garment, params) for garment in prepared.garments)
     # Where old weights or mirror images join in, the limit comes after them.
     limit = 0 if joined else params.max_influences
-    transfer, solved = yield prepared.start(masks, params, limit)
+    transfer, solved = yield prepared.start(masks, params, limit, near)
     rows = []
     for number, garment in enumerate(prepared.garments):
         folded = garment.completion.fold(prepared.rows_of(solved, number), garment.opposite)

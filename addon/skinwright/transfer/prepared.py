@@ -56,9 +56,11 @@ class Prepared:
 
     def check_reach(self, params: TransferParams) -> None:
         """Raise NativeError if all is so far away that it must be a mistake; thresholds refuse that by themselves."""
+        if params.method != "confidence":
+            return
         reach = _OUT_OF_REACH * _diagonal(self._shapes[1], self._frame)
         nearest = float(np.min(self.distance, initial=np.inf))
-        if params.method == "confidence" and nearest > reach:
+        if nearest > reach:
             raise native.NativeError(
                 f"{self.name}: nothing matched: its smallest distance from the source is {nearest:.4g}, more than half "
                 "of the source's size: check that both have the same scale and place"
@@ -94,11 +96,16 @@ class Prepared:
         return self._own(self._inpainting.confidence(mask=self._spread([mask]), **self._settings | thresholds))
 
     def start(
-        self, masks: Sequence[NDArray[np.uint8] | None], params: TransferParams, max_influences: int
+        self,
+        masks: Sequence[NDArray[np.uint8] | None],
+        params: TransferParams,
+        max_influences: int,
+        near: bool = False,
     ) -> native.Job:
-        """Solve on threads of Rust's own; a mask (V,) or None for each target."""
+        """Solve on threads of Rust's own; a mask (V,) or None for each target. With `near` only around what the masks
+        have changed since the last solve, if that can be: `report["solved_near"]` tells."""
         settings = self._keywords(params) | {"max_influences": max_influences}
-        return self._inpainting.start(mask=self._spread(masks), **settings)
+        return self._inpainting.start(mask=self._spread(masks), near=near, **settings)
 
     def _keywords(self, params: TransferParams) -> dict[str, Any]:
         """The settings of a solve."""
@@ -158,6 +165,9 @@ def in_frame(positions: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDA
 
 def _diagonal(shape: Geometry, frame: NDArray[np.float64]) -> float:
     """Of the box around all vertices that a triangle uses, or around all if there is none."""
+    used = np.zeros(len(shape.positions), bool)
+    used[shape.triangles.reshape(-1)] = True
     positions = in_frame(shape.positions, frame)
-    used = positions[shape.triangles.reshape(-1)] if len(shape.triangles) else positions
-    return float(np.linalg.norm(np.ptp(used, axis=0)))
+    positions = positions if used.all() or not used.any() else positions[used]
+    coordinates = np.ascontiguousarray(positions.T)  # NumPy is slow along the longer axis
+    return float(np.linalg.norm(np.ptp(coordinates, axis=1)))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..files import REPORT, write_whole
-from .manifest import Job
+from .manifest import Job, sha256
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,13 @@ class Outcome:
 
 
 def kept(folder: Path, job: Job, inputs: str) -> dict[str, Any] | None:
-    """The record of an earlier run with the same inputs whose files are all as it wrote them."""
+    """The record of an earlier run with the same inputs whose files are all as it wrote or found them."""
     try:
         record = json.loads((folder / f"{job.name}.json").read_text(encoding="utf-8"))
-        files = record["files"].items()
-        whole = all(hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest for name, digest in files)
-    except (OSError, ValueError, KeyError, AttributeError):
+        known = {folder / name: digest for name, digest in record["files"].items()}
+        known |= {Path(name): digest for name, digest in record["depends"].items()}
+        whole = all(sha256(path) == digest for path, digest in known.items())
+    except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return None
     return record if whole and record.get("inputs") == inputs else None
 

@@ -1,6 +1,5 @@
 """One job of a wardrobe inside Blender: load both files, transfer, leave the weights and a record."""
 
-import hashlib
 import io
 from pathlib import Path
 
@@ -8,13 +7,16 @@ import bpy
 import numpy as np
 
 from .. import native
-from ..errors import Refused
+from ..errors import sentence
 from ..reporting import Report
-from ..scene import armature, loading, vertex_groups
+from ..scene import armature, blend_file, loading, vertex_groups
 from ..scene.error import SceneError
-from ..transfer import from_json, transfer_weights
-from .manifest import Job, ManifestError
+from ..transfer import TransferParams, from_json, transfer_weights
+from .manifest import Job, ManifestError, sha256
 from .results import Outcome, kept, write, write_record
+
+# Of the files that a job may leave.
+ENDINGS = (".npz", ".json", ".blend")
 
 
 def run(job: Job, folder: Path, *, save_blend: bool = False) -> Outcome:
@@ -25,25 +27,37 @@ def run(job: Job, folder: Path, *, save_blend: bool = False) -> Outcome:
         if record:
             return Outcome(job.name, "kept", record)
         record = _work(job, folder, save_blend) | {"inputs": inputs}
-    except (ManifestError, Refused, OSError) as error:
+        write_record(folder, job, record)
+    except ManifestError as error:
         return Outcome(job.name, "failed", {"error": str(error)})
-    write_record(folder, job, record)
+    except Exception as error:  # one bad garment of a thousand stops none of the others
+        return Outcome(job.name, "failed", {"error": sentence(job.name, error)})
     return Outcome(job.name, "done", record)
 
 
 def _work(job: Job, folder: Path, save_blend: bool) -> dict:
-    params = from_json(job.settings)
+    params = _params(job)
     loading.empty()
-    source = _body(job, loading.load(job.body))
-    targets = _garments(job, loading.load(job.garment))
+    bodies = loading.load(job.body)
+    source = _body(job, bodies)
+    with loading.names_set_free(bodies):
+        targets = _garments(job, loading.load(job.garment))
+    depends = {str(path): sha256(path) for path in loading.depends(job.body, job.garment)}
     report = transfer_weights(bpy.context, source, targets, params)
     written = {f"{job.name}.npz": write(folder, f"{job.name}.npz", _weights(targets))}
     if save_blend:
-        # Blender writes its file whole or not at all by itself.
         path = folder / f"{job.name}.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), copy=True, check_existing=False)
-        written[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
-    return {"files": written, "sentence": report.sentence(), "warnings": report.all_warnings()} | _scores(report)
+        blend_file.save_copy(path)
+        written[path.name] = sha256(path)
+    said = {"sentence": report.sentence(), "warnings": report.all_warnings()}
+    return {"files": written, "depends": depends} | said | _scores(report)
+
+
+def _params(job: Job) -> TransferParams:
+    try:
+        return from_json(job.settings)
+    except ValueError as error:
+        raise SceneError(f"settings of {job.name}: {error}") from error
 
 
 def _body(job: Job, loaded: list[bpy.types.Object]) -> bpy.types.Object:

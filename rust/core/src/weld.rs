@@ -97,7 +97,7 @@ fn close_pairs(positions: &[[f32; 3]], tolerance: f64) -> Vec<(u32, u32)> {
     let cells_of = |i: usize, keys: &mut Vec<u64>| {
         for_each_cell(positions[i], width, tolerance, |cell| keys.push(u64::from(cell) << 32 | i as u64));
     };
-    let mut keys: Vec<u64> = (0..positions.len())
+    let keys: Vec<u64> = (0..positions.len())
         .into_par_iter()
         .with_min_len(4096)
         .fold(Vec::new, |mut keys, i| {
@@ -108,22 +108,35 @@ fn close_pairs(positions: &[[f32; 3]], tolerance: f64) -> Vec<(u32, u32)> {
             left.append(&mut right);
             left
         });
-    keys.par_sort_unstable();
-    let in_cell = |cell: &[u64]| {
+    let (starts, points) = buckets(&keys);
+    let in_bucket = |ends: &[u32]| {
         let mut pairs = Vec::new();
-        if cell.len() > 1 {
-            let points: Vec<u32> = cell.iter().map(|&key| key as u32).collect();
-            append_close_pairs(positions, &points, tolerance, &mut pairs);
-        }
+        append_close_pairs(positions, &points[ends[0] as usize..ends[1] as usize], tolerance, &mut pairs);
         pairs
     };
-    keys.par_chunk_by(|a, b| a >> 32 == b >> 32).flat_map_iter(in_cell).collect()
+    starts.par_windows(2).with_min_len(4096).filter(|ends| ends[1] - ends[0] > 1).flat_map_iter(in_bucket).collect()
+}
+
+/// Points by the hash of their cell, in about as many buckets as there are keys (hash, point): where each begins, and all.
+fn buckets(keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
+    let mask = keys.len().next_power_of_two() - 1;
+    let bucket = |key: u64| (key >> 32) as usize & mask;
+    let mut starts = vec![0u32; mask + 2];
+    keys.iter().for_each(|&key| starts[bucket(key) + 1] += 1);
+    (0..=mask).for_each(|k| starts[k + 1] += starts[k]);
+    let (mut next, mut points) = (starts.clone(), vec![0; keys.len()]);
+    for &key in keys {
+        let at = &mut next[bucket(key)];
+        points[*at as usize] = key as u32;
+        *at += 1;
+    }
+    (starts, points)
 }
 
 /// Calls `visit` with the hash of every cell within `reach` of a point.
 fn for_each_cell(position: [f32; 3], width: f64, reach: f64, mut visit: impl FnMut(u32)) {
     let ranges = position.map(|x| {
-        let at = |x: f64| (x / width).floor() as i64;
+        let at = |x: f64| floor(x / width);
         (at(f64::from(x) - reach), at(f64::from(x) + reach))
     });
     for x in ranges[0].0..=ranges[0].1 {
@@ -133,6 +146,12 @@ fn for_each_cell(position: [f32; 3], width: f64, reach: f64, mut visit: impl FnM
             }
         }
     }
+}
+
+/// The next lower whole number, without the call that `f64::floor` is where nothing is known of the processor.
+fn floor(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero - i64::from((towards_zero as f64) > x)
 }
 
 fn hash(cell: [i64; 3]) -> u32 {

@@ -7,7 +7,7 @@ use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLike, PyReadonlyArray, Py
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::error::InvalidParameter;
+use crate::error::{InvalidMesh, InvalidParameter};
 use crate::memory;
 
 /// A 1-D argument of any number type.
@@ -112,6 +112,23 @@ fn rows_of<T: Element, const N: usize>(
         return Err(InvalidParameter::new_err(format!("{name} must have shape (N, {N}), not ({found}, {columns})")));
     }
     Ok(array.as_array().rows().into_iter().map(row).collect())
+}
+
+/// Refuses numbers that are not finite; `name` is the argument's.
+pub fn check_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>, name: &str) -> PyResult<()> {
+    if numbers.into_iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(InvalidParameter::new_err(format!("{name} has a number that is not finite")))
+}
+
+/// Rows of an (N, 3) array of positions, all of them finite.
+pub fn positions(array: &Matrix<'_, f32>, name: &str) -> PyResult<Vec<[f32; 3]>> {
+    let rows = triples(array, name)?;
+    if let Some(vertex) = rows.iter().position(|row| row.iter().any(|x| !x.is_finite())) {
+        return Err(InvalidMesh::new_err(format!("{name} has a position that is not finite at vertex {vertex}")));
+    }
+    Ok(rows)
 }
 
 /// Entries of a 1-D array.

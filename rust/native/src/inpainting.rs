@@ -152,17 +152,23 @@ impl Inpainting {
         Transfer::of(py, transfer)
     }
 
-    /// Starts `solve` on threads of its own.
-    #[pyo3(signature = (**settings))]
-    fn start(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
+    /// Starts `solve` on threads of its own. With `near` only the neighbourhood of what the mask has changed since the last
+    /// solve is solved again, where that is possible: `report["solved_near"]` is its number of vertices, or None.
+    #[pyo3(signature = (*, near=false, **settings))]
+    fn start(&self, py: Python<'_>, near: bool, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Job> {
         let (settings, mask) = keywords(settings)?;
         // While another job holds the target there is nobody to ask; that one was looked at.
         if let Ok(mut held) = self.core.try_lock() {
             let inpainting: &mut core::Inpainting = &mut held;
-            expect_solve(&enter(py, self.threads, || inpainting.matched(mask.as_deref(), &settings))?)?;
+            if !(near && inpainting.has_base()) {
+                expect_solve(&enter(py, self.threads, || inpainting.matched(mask.as_deref(), &settings))?)?;
+            }
         }
         let core = Arc::clone(&self.core);
-        let work = move |progress: &Progress| lock(&core).solve(mask.as_deref(), &settings, progress);
+        let work = move |progress: &Progress| {
+            let (mut core, mask) = (lock(&core), mask.as_deref());
+            if near { core.solve_near(mask, &settings, progress) } else { core.solve(mask, &settings, progress) }
+        };
         Job::start(self.threads, work, |py, transfer| Ok(Py::new(py, Transfer::of(py, transfer)?)?.into_any()))
     }
 

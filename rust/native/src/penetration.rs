@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use skinwright_core::penetration::{Skinned, depths_in_poses};
 
-use crate::arrays::{Matrix, Stack, triples};
+use crate::arrays::{self, Matrix, Stack, triples};
 use crate::error::{InvalidParameter, enter};
 use crate::memory;
 use crate::ranges;
@@ -26,7 +26,8 @@ pub fn penetration<'py>(
     pose_from_rest: Stack<'py, f64>,
     #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-    let (body_rest, rest) = (triples(&body_positions, "body_positions")?, triples(&positions, "positions")?);
+    let (body_rest, rest) =
+        (arrays::positions(&body_positions, "body_positions")?, arrays::positions(&positions, "positions")?);
     let triangles = triples(&body_triangles, "body_triangles")?;
     let (body_weights, weights) = (body_weights.to_core(py)?, weights.to_core(py)?);
     let (bones, matrices) = (weights.n_bones() as usize, pose(&pose_from_rest)?);

@@ -10,7 +10,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
-use crate::arrays::{Matrix, Vector, entries, triples};
+use crate::arrays::{self, Matrix, Vector, entries, triples};
 use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked, to_python};
 use crate::memory;
 use crate::ranges;
@@ -56,7 +56,8 @@ impl Refiner {
         self_collision: bool,
         #[pyo3(from_py_with = ranges::threads)] threads: usize,
     ) -> PyResult<Self> {
-        let (positions, triangles) = (triples(&rest_positions, "rest_positions")?, triples(&triangles, "triangles")?);
+        let (positions, triangles) =
+            (arrays::positions(&rest_positions, "rest_positions")?, triples(&triangles, "triangles")?);
         let (weights, parents) = (weights.to_core(py)?, entries(&bone_parents));
         let segments = segments(&bone_segments)?;
         let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };

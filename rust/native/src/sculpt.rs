@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use skinwright_core::sculpt::{self as core, MAX_MEMBERS, Options, Residuals, SimplexQp};
 
-use crate::arrays::{Matrix, Vector, entries, triples};
+use crate::arrays::{Matrix, Vector, check_finite, entries, triples};
 use crate::error::{InvalidParameter, SkinwrightError, enter};
 use crate::memory;
 use crate::ranges;
@@ -256,6 +256,9 @@ pub fn simplex_qp<'py>(
         )));
     }
     let (h, g) = (h.as_array(), g.as_array());
+    check_finite(h.iter(), "h")?;
+    check_finite(g.iter(), "g")?;
+    check_finite(start.as_array().iter(), "start")?;
     let (h, g) = (h.as_standard_layout(), g.as_standard_layout());
     let (h, g) = (h.as_slice().expect("standard layout"), g.as_slice().expect("standard layout"));
     let w = start.as_array().iter().copied().collect();

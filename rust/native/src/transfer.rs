@@ -56,6 +56,7 @@ fn report_dict<'py>(py: Python<'py>, report: &core::Report) -> PyResult<Bound<'p
     dict.set_item("rigid_islands", report.rigid_islands)?;
     dict.set_item("blocks", report.blocks)?;
     dict.set_item("factored_blocks", report.factored_blocks)?;
+    dict.set_item("solved_near", report.solved_near)?;
     dict.set_item("bones_used", report.bones_used)?;
     dict.set_item("most_influences", report.most_influences)?;
     dict.set_item("source_unweighted", report.source_unweighted)?;

@@ -35,9 +35,10 @@ use glam::Vec3;
 use accuracy::{backward_error, defect};
 use fronts::multifrontal::Multifrontal;
 pub use substitute::forward::MOST_COLUMNS;
+use substitute::rows::Layout;
+pub use substitute::rows::{SparseRows, Term};
 pub use substitute::solution::{RightHandSides, Solution};
-use substitute::sparse::Layout;
-pub use substitute::sparse::{SparseRows, Term};
+pub use substitute::sparse::Workspace;
 use supernodal::Supernodal;
 
 /// Lower triangle (diagonal included) of a symmetric matrix, compressed by column, rows ascending.
@@ -277,23 +278,20 @@ impl<'f> SparseSolver<'f> {
         self.layout.collect(append)
     }
 
-    /// The sum of `terms`, each with a factor for every unknown.
-    pub fn sum(&self, terms: &[Term<'_, 'f>]) -> SparseRows<'f> {
-        self.layout.sum(terms)
-    }
-
-    /// Solves for `rows` up to a magnitude that counts as zero, the `least` of each unknown. What is smaller may be left out;
-    /// once `stop` is set the answer means nothing.
+    /// Solves for the sum of `terms`, each with a factor for every unknown, up to a magnitude that counts as zero, the `least`
+    /// of each unknown. What is smaller may be left out; once `stop` is set the answer means nothing.
     pub fn solve(
         &self,
-        rows: &SparseRows<'f>,
+        terms: &[Term<'_, 'f>],
         least: impl Fn(usize) -> f64 + Sync,
+        work: &mut Workspace,
         stop: &AtomicBool,
     ) -> SparseRows<'f> {
+        let sum = self.layout.sum(terms);
         match self.factor {
-            Factor::Multifrontal(factor) => factor.solve_sparse(rows, &least, stop),
+            Factor::Multifrontal(factor) => factor.solve_sparse(&sum, &least, work, stop),
             factor => {
-                let rhs = rows.to_dense(self.layout.unknowns);
+                let rhs = sum.to_dense();
                 let solution = factor.solve(&rhs);
                 self.layout.only_front(|k| solution.row(k), least, rhs.columns)
             }
@@ -331,7 +329,7 @@ mod tests {
         let whole = factor.solve(&RightHandSides::sparse(20_000, 1, &[100], vec![1.0]));
         let sparse = factor.sparse();
         let data = sparse.collect(|i, row| row.extend((i == 100).then_some((37, 1.0))));
-        let near = sparse.solve(&data, |_| 1e-9, &NEVER);
+        let near = sparse.solve(&[(&data, &|_| 1.0)], |_| 1e-9, &mut Workspace::default(), &NEVER);
         let mut stored = 0;
         for i in 0..20_000 {
             let row: Vec<(u32, f64)> = near.row(i).collect();
@@ -355,8 +353,10 @@ mod tests {
             let sparse = factor.sparse();
             let data =
                 sparse.collect(|i, row| row.extend((0..60).map(|c| (c as u32, value(i, c))).filter(|x| x.1 != 0.0)));
-            let data = sparse.sum(&[(&data, &|_| 1.0), (&data, &|_| 2.0)]);
-            let found = sparse.solve(&data, |_| 0.0, &NEVER);
+            let mut work = Workspace::default();
+            // Once more with what is left in the memory.
+            sparse.solve(&[(&data, &|_| 5.0)], |_| 0.0, &mut work, &NEVER);
+            let found = sparse.solve(&[(&data, &|_| 1.0), (&data, &|_| 2.0)], |_| 0.0, &mut work, &NEVER);
             for i in 0..n {
                 let mut wanted: Vec<f64> = whole.row(i).collect();
                 found.row(i).for_each(|(column, value)| wanted[column as usize] -= value);

@@ -1,4 +1,4 @@
-"""How long after the brush is released the weights are written, and the view has drawn them."""
+"""How long after the brush is released the weights are written, the view has drawn them, and the whole is solved."""
 
 import sys
 import time
@@ -21,13 +21,16 @@ def steps(window: Window) -> Steps:
     yield 0.5
     enable()
     bpy.types.SpaceView3D.draw_handler_add(lambda: drawn.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL")
-    for vertices in map(int, sys.argv[sys.argv.index("--") + 1 :]):
+    methods, *sizes = sys.argv[sys.argv.index("--") + 1 :]
+    for vertices, method in [(int(size), method) for size in sizes for method in methods.split(",")]:
         _, figure, garment = dress.build(vertices, BONES)
         bpy.context.scene.skinwright.transfer.source = figure
+        bpy.context.scene.skinwright.transfer.method = method
         look(window)
         yield 0.5
         yield from begin_painting(window)
-        figures = {"first solve": painting().seconds[0], "written": [], "drawn": [], "solve and write": []}
+        names = ("solve and write", "written", "drawn", "whole")
+        figures = {"first solve": painting().seconds[0]} | {name: [] for name in names}
         for stroke in range(STROKES):
             solved = len(painting().seconds)
             y = 130 - 18 * stroke
@@ -38,8 +41,10 @@ def steps(window: Window) -> Steps:
             figures["solve and write"].append(painting().seconds[-1])
             figures["written"].append(written - released[0])
             figures["drawn"].append(next(at for at in drawn if at > written) - released[0])
+            yield from until(lambda: not painting().unsettled, 20)
+            figures["whole"].append(max(painting().settled_at, written) - released[0])
         figures["overlay"] = overlay_seconds(window)
-        record[str(len(garment.data.vertices))] = figures
+        record[f"{len(garment.data.vertices)} {method.lower()}"] = figures
         window.key("ESC")
         yield from until(lambda: painting() is None)
 

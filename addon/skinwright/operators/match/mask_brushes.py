@@ -60,6 +60,10 @@ class MaskBrushes(BrushSession):
         added = ", and it has the source's armature now" if self.painting.armature_added else ""
         return [Message("INFO", f"{self.object.name}: mask and weights kept{added}")]
 
+    def tidy(self) -> None:
+        """No file gets rows that are not quite those of a transfer."""
+        self.painting.settle()
+
     def restore(self) -> None:
         """Bit for bit."""
         self.painting.restore()

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy.types import Context, Event
 
 from ... import files, jobs, preferences
@@ -36,6 +36,9 @@ class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOpera
     )
     frame_start: IntProperty(name="Start", description="First frame", default=1)
     frame_end: IntProperty(name="End", description="Last frame", default=250)
+    overwrite: BoolProperty(
+        name="Overwrite", description="Replace a file that is there already", default=False, options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def refusal(cls, context: Context) -> str:
@@ -62,8 +65,8 @@ class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOpera
         obj, kind = found(context), self.kind.lower()
         params = self.to_params(preferences.threads(context))
         path = self._path(obj.name, kind)
-        # Baking again replaces a cache, and nothing else.
-        files.check_output(path, others=blend_file.opened(), overwrite=path.suffix.lower() == f".{kind}")
+        own = mesh_cache.is_own(obj, path)
+        files.check_output(path, others=blend_file.opened(), overwrite=own or self.overwrite)
         return cache.steps(obj, params, path, (self.frame_start, self.frame_end), kind)
 
     def _path(self, name: str, kind: str) -> Path:

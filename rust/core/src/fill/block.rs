@@ -7,6 +7,7 @@ use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SparseRows, 
 
 use super::constraint::Known;
 use super::rows::{KnownRows, Row};
+use super::screened::{CORRECTION, SOLVES};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -88,23 +89,38 @@ enum Values<'b> {
 #[derive(Debug)]
 pub(super) struct SparseColumns<'b> {
     columns: Vec<u32>,
-    rows: SparseRows<'b>,
+    solves: Solves<'b>,
     least: f64,
 }
 
+/// The solves that lead to rows of a block, see [`screened`](super::screened).
+#[derive(Debug)]
+pub(super) struct Solves<'b> {
+    /// Those before the last, if they are kept.
+    pub earlier: Option<[SparseRows<'b>; SOLVES - 1]>,
+    /// The last.
+    pub rows: SparseRows<'b>,
+}
+
 impl<'b> SparseColumns<'b> {
-    /// `rows` stores the values of `columns`, of which those below the `least` magnitude are left out.
-    pub(super) fn new(columns: Vec<u32>, rows: SparseRows<'b>, least: f64) -> Self {
-        Self { columns, rows, least }
+    /// `solves` store the values of `columns`; of the rows those below the `least` magnitude are left out.
+    pub(super) fn new(columns: Vec<u32>, solves: Solves<'b>, least: f64) -> Self {
+        Self { columns, solves, least }
+    }
+
+    /// What solve number `solve` has found for unknown `k`.
+    fn found(&self, solve: usize, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let earlier = self.solves.earlier.iter().flatten().nth(solve);
+        let row = earlier.unwrap_or(&self.solves.rows).row(k);
+        row.map(|(slot, value)| (self.columns[slot as usize], value))
     }
 
     fn minimum(&self) -> f64 {
-        let noticeable = self.rows.values().filter(|value| value.abs() >= self.least);
-        noticeable.fold(f64::INFINITY, f64::min)
+        self.solves.rows.minimum(self.least)
     }
 
     fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let noticeable = self.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
+        let noticeable = self.solves.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
         noticeable.map(|(slot, value)| (self.columns[slot as usize], value))
     }
 }
@@ -130,6 +146,16 @@ impl<'b> BlockRows<'b> {
         let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
         std::iter::zip(self.columns.iter().copied(), values)
             .chain(sparse.iter().flat_map(move |columns| columns.row(k)))
+    }
+
+    /// Columns and values that solve number `solve` of a screened block has found for unknown `k`, if they were all kept.
+    pub(super) fn found(&self, solve: usize, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let (constant, sparse) = match &self.values {
+            Values::Constant(value) => ((solve != CORRECTION).then_some((self.columns[0], *value)), [].as_slice()),
+            Values::Sparse(rows, _) => (None, &rows[..]),
+            Values::Solved(_) => (None, [].as_slice()),
+        };
+        constant.into_iter().chain(sparse.iter().flat_map(move |columns| columns.found(solve, k)))
     }
 
     /// The smallest value of the block's `count` unknowns.

@@ -2,8 +2,12 @@
 
 use super::block::{Block, BlockRows};
 use super::constraint::Constraint;
-use super::rows::{KnownRows, Row};
+use super::rows::{KnownRows, Ragged, Row};
+use super::screened::Found;
 use crate::adjacency::NONE;
+
+/// Magnitude that is not worth to be kept: a tenth of what a screened solve leaves out.
+const NOTHING: f64 = 1e-7;
 
 /// The rows of all vertices, before anybody clamps or normalises them.
 pub struct Filled<'a> {
@@ -47,6 +51,21 @@ impl<'a> Filled<'a> {
             },
             (b, k) => out.extend(self.rows[b as usize].row(k as usize)),
         }
+    }
+
+    /// What each of the four solves of a screened problem has found, if they were all kept.
+    pub fn found(&self) -> Found {
+        let table = |solve: usize| {
+            Ragged::new(self.places.len(), |i, out| {
+                if let (b, k) = self.places[i]
+                    && b != NONE
+                {
+                    let row = self.rows[b as usize].found(solve, k as usize);
+                    out.extend(row.filter(|(_, value)| value.abs() > NOTHING).map(|(c, value)| (c, value as f32)));
+                }
+            })
+        };
+        Found([0, 1, 2, 3].map(table))
     }
 
     /// The smallest value solved for, 0 where nothing was.

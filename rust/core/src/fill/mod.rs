@@ -21,7 +21,7 @@ mod system;
 pub use constraint::Constraint;
 pub use filled::Filled;
 pub use rows::{GivenRows, Ragged, Row};
-pub use screened::RowTable;
+pub use screened::{Found, Patch, RowTable, Screen};
 
 use std::borrow::Cow;
 
@@ -277,20 +277,18 @@ impl Fill {
     }
 
     /// Solves the problem posed last, with l = 0 and confidences from [`screened::confidence`], such that every soft row is
-    /// trusted over its length. `rows` is the [table](Self::row_table) of the `given` ones. `kept` is the share of the change
-    /// of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's rows.
+    /// trusted over its length. `screen` has the [table](Self::row_table) of the `given` rows, and what else there is to it.
     ///
     /// # Errors
     /// Those of [`Fill::solve`].
     pub fn solve_screened<'a>(
         &'a self,
         given: GivenRows<'a>,
-        rows: &RowTable,
-        kept: &Ragged<f64>,
+        screen: Screen<'_>,
         progress: &Progress,
     ) -> Result<Filled<'a>> {
         let number = number_block_unknowns(self.blocks.as_slice(), self.known.unknown.len());
-        let all = screened::Given { laplacian: &self.laplacian, rows, kept, number: &number };
+        let all = screened::Given { laplacian: &self.laplacian, screen, number: &number };
         let found = self.blocks.solve_screened(all, progress)?;
         let known = KnownRows { known: &self.known, weld: self.weld.as_ref(), given };
         Ok(Filled::new(known, self.blocks.as_slice(), found))

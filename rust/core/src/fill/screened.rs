@@ -15,11 +15,12 @@
 //! edge scaled by the share t of its change that is to be kept (gradient-domain blending: Pérez, Gangnet, Blake, *Poisson Image
 //! Editing*, SIGGRAPH 2003, doi 10.1145/882262.882269).
 //!
-//! Influence dies away within a few h, so a column is zero in most of the mesh, and is not even stored there.
+//! Influence dies away within a few h, so a column is zero in most of the mesh, and is not even stored there. For the same
+//! reason a part of the mesh can be solved again by itself, held at what each of the four solves has found around it ([`Patch`]).
 
-use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver};
+use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver, Term, Workspace};
 
-use super::block::{Block, BlockRows, Places, SparseColumns};
+use super::block::{Block, BlockRows, Places, Solves, SparseColumns};
 use super::rows::Ragged;
 use crate::adjacency::NONE;
 use crate::error::Result;
@@ -40,6 +41,39 @@ const FEWER_COLUMNS: usize = 16;
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
 
+/// What each of the four solves has found, X1, X2, U and W in this order: columns and values of every vertex of the mesh that
+/// is solved on, empty where nothing was solved for.
+#[derive(Debug)]
+pub struct Found(pub(super) [Ragged<(u32, f32)>; SOLVES]);
+
+pub(super) const SOLVES: usize = 4;
+/// The place of U among them, which is zero at fixed rows.
+pub(super) const CORRECTION: usize = 2;
+
+/// Makes the problem a part of a larger one: some fixed vertices, the `held` ones (V), are not fixed there, and have the values
+/// that each solve of the larger problem has `found`.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch<'a> {
+    /// What was found.
+    pub found: &'a Found,
+    /// Who has these values.
+    pub is_held: &'a [bool],
+}
+
+/// What a screened problem is made of, besides constraints.
+#[derive(Debug, Clone, Copy)]
+pub struct Screen<'a> {
+    /// The [table](super::Fill::row_table) of the given rows.
+    pub rows: &'a RowTable,
+    /// Share of the change of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's
+    /// rows, (V).
+    pub kept: &'a Ragged<f64>,
+    /// If this is only a part of a problem.
+    pub patch: Option<Patch<'a>>,
+    /// Whether all four solves are wanted, see [`super::Filled::found`].
+    pub with_all_solves: bool,
+}
+
 /// The confidence that makes a row with this `mass` trusted over this `length`.
 pub fn confidence(mass: f64, length: f64) -> f64 {
     REACH * mass / (length * length)
@@ -49,10 +83,7 @@ pub fn confidence(mass: f64, length: f64) -> f64 {
 #[derive(Clone, Copy)]
 pub(super) struct Given<'a> {
     pub laplacian: &'a Laplacian,
-    /// (V)
-    pub rows: &'a RowTable,
-    /// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V).
-    pub kept: &'a Ragged<f64>,
+    pub screen: Screen<'a>,
     /// Place of every unknown in its block, (V).
     pub number: &'a [u32],
 }
@@ -60,7 +91,7 @@ pub(super) struct Given<'a> {
 /// One block with what all of its columns need. Its vertices are the unknowns first, then those around.
 struct Screened<'a> {
     block: &'a Block,
-    rows: &'a RowTable,
+    screen: Screen<'a>,
     /// For each unknown: vertices around whose change is kept, and with what weight.
     kept: Ragged<(u32, f64)>,
     /// C and M of the unknowns.
@@ -85,7 +116,7 @@ pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress)
     let solver = block.factor.sparse();
     let solve = |(first, columns): (usize, &[u32])| {
         let group = Group { screened: &screened, columns, places: &places, first, solver, progress };
-        group.solve().map(|found| SparseColumns::new(columns.to_vec(), found, LEAST))
+        group.solve().map(|solves| SparseColumns::new(columns.to_vec(), solves, LEAST))
     };
     let together = if block.unknowns().len() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
     let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
@@ -102,7 +133,7 @@ impl<'a> Screened<'a> {
         let ratios = block.soft.iter().map(|&(k, value)| value / mass[k as usize]);
         let least_ratio = ratios.fold(f64::INFINITY, f64::min);
         let kept = Ragged::new(unknowns.len(), |k, out| append_kept(block, given, &confidence, k, out));
-        Self { block, rows: given.rows, kept, confidence, mass, least_ratio }
+        Self { block, screen: given.screen, kept, confidence, mass, least_ratio }
     }
 
     fn count(&self) -> usize {
@@ -111,8 +142,18 @@ impl<'a> Screened<'a> {
 
     /// The row given for a vertex, unknown or around.
     fn row(&self, local: usize) -> &[(u32, f64)] {
+        self.screen.rows.of(self.vertex(local))
+    }
+
+    fn vertex(&self, local: usize) -> usize {
         let (unknowns, around) = (self.block.unknowns(), &self.block.boundary.vertices);
-        self.rows.of(unknowns.get(local).map_or_else(|| around[local - unknowns.len()], |&i| i) as usize)
+        unknowns.get(local).map_or_else(|| around[local - unknowns.len()], |&i| i) as usize
+    }
+
+    /// What the solves have found for a vertex around the unknowns, if it is held.
+    fn held(&self, local: usize) -> Option<&Found> {
+        let patch = self.screen.patch?;
+        patch.is_held[self.vertex(local)].then_some(patch.found)
     }
 
     fn vertices(&self) -> std::ops::Range<usize> {
@@ -121,6 +162,9 @@ impl<'a> Screened<'a> {
 
     /// Column and value of the row that all vertices have whose row is known, if it has no other.
     fn only_row(&self) -> Option<(u32, f64)> {
+        if self.screen.patch.is_some() {
+            return None;
+        }
         let mut rows = self.vertices().map(|local| self.row(local)).filter(|row| !row.is_empty());
         let &[only] = rows.next()? else { return None };
         rows.all(|row| *row == [only]).then_some(only)
@@ -129,11 +173,16 @@ impl<'a> Screened<'a> {
     /// All columns of the known rows, ascending.
     fn columns(&self) -> Vec<u32> {
         let mut is_used = Vec::new();
-        for &(column, _) in self.vertices().flat_map(|local| self.row(local)) {
+        let mut use_column = |column: u32| {
             if is_used.len() <= column as usize {
                 is_used.resize(column as usize + 1, false);
             }
             is_used[column as usize] = true;
+        };
+        self.vertices().flat_map(|local| self.row(local)).for_each(|&(column, _)| use_column(column));
+        for local in self.vertices().skip(self.count()) {
+            let found = self.held(local).into_iter().flat_map(|found| &found.0);
+            found.flat_map(|rows| rows.of(self.vertex(local))).for_each(|&(column, _)| use_column(column));
         }
         std::iter::zip(0.., is_used).filter(|&(_, is_used)| is_used).map(|(column, _)| column).collect()
     }
@@ -146,9 +195,9 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
     }
     let i = block.unknowns()[k] as usize;
     let (neighbours, cotangents) = given.laplacian.row(i);
-    for ((&j, cotangent), share) in std::iter::zip(std::iter::zip(neighbours, cotangents), given.kept.of(i)) {
-        let there = given.rows.of(j as usize);
-        if cotangent * share == 0.0 || there.is_empty() || there == given.rows.of(i) {
+    for ((&j, cotangent), share) in std::iter::zip(std::iter::zip(neighbours, cotangents), given.screen.kept.of(i)) {
+        let there = given.screen.rows.of(j as usize);
+        if cotangent * share == 0.0 || there.is_empty() || there == given.screen.rows.of(i) {
             continue;
         }
         let local = match given.number[j as usize] {
@@ -173,36 +222,69 @@ struct Group<'a, 'b> {
 
 impl<'b> Group<'_, 'b> {
     /// Values of the unknowns.
-    fn solve(&self) -> Result<SparseRows<'b>> {
+    fn solve(&self) -> Result<Solves<'b>> {
         let Screened { confidence, mass, least_ratio, .. } = self.screened;
         let solver = self.solver;
         let (given, added) =
             (solver.collect(|k, out| self.append(k, 1.0, out)), solver.collect(|k, out| self.add(k, out)));
         let (once, pull) = (|_: usize| 1.0, |k: usize| confidence[k]);
-        let first = self.substitute(&solver.sum(&[(&given, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
-        let second = self.substitute(&solver.sum(&[(&first, &pull), (&added, &once)]), |_| NEGLIGIBLE)?;
+        let mut work = Workspace::default();
+        let mut solve = |solve: usize, terms: &[Term<'_, 'b>], least: &(dyn Fn(usize) -> f64 + Sync)| {
+            self.substitute(solve, terms, least, &mut work)
+        };
+        let first = solve(0, &[(&given, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
+        let second = solve(1, &[(&first, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
         let scale = |k: usize| confidence[k] * confidence[k] / mass[k];
         let to_given = |k: usize| scale(k) / (REACH * REACH);
         let to_second = |k: usize| -scale(k) * (1.0 / (REACH * REACH) + 1.0);
-        let defect = solver.sum(&[(&given, &to_given), (&first, &scale), (&second, &to_second)]);
-        drop((given, first));
         let least = |k: usize| NEGLIGIBLE * (confidence[k] / mass[k]).max(*least_ratio);
-        let correction = self.substitute(&defect, least)?;
-        drop(defect);
-        let corrected = solver.sum(&[(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)]);
-        drop((correction, second, added));
-        self.substitute(&corrected, |_| LEAST)
+        let correction = solve(CORRECTION, &[(&given, &to_given), (&first, &scale), (&second, &to_second)], &least)?;
+        drop(given);
+        let first = self.screened.screen.with_all_solves.then_some(first);
+        let corrected: [Term; 3] = [(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)];
+        let rows = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
+        Ok(Solves { earlier: first.map(|first| [first, second, correction]), rows })
     }
 
-    fn substitute(&self, rows: &SparseRows<'b>, least: impl Fn(usize) -> f64 + Sync) -> Result<SparseRows<'b>> {
-        let found = self.solver.solve(rows, least, self.progress.stop());
+    /// The solution of solve number `solve` for the sum of `terms` and what is held.
+    fn substitute(
+        &self,
+        solve: usize,
+        terms: &[Term<'_, 'b>],
+        least: &(dyn Fn(usize) -> f64 + Sync),
+        work: &mut Workspace,
+    ) -> Result<SparseRows<'b>> {
+        let stop = self.progress.stop();
+        let found = match self.screened.screen.patch {
+            None => self.solver.solve(terms, least, work, stop),
+            Some(_) => {
+                let held = self.solver.collect(|k, out| self.add_held(solve, k, out));
+                self.solver.solve(&[terms, &[(&held, &|_: usize| 1.0)]].concat(), least, work, stop)
+            }
+        };
         self.progress.check().map(|()| found)
+    }
+
+    /// Appends what the held vertices around unknown `k` bring to a solve.
+    fn add_held(&self, solve: usize, k: usize, out: &mut Vec<(u32, f64)>) {
+        let boundary = &self.screened.block.boundary;
+        for at in boundary.starts[k]..boundary.starts[k + 1] {
+            let local = self.screened.count() + boundary.columns[at] as usize;
+            if let Some(found) = self.screened.held(local) {
+                let row = found.0[solve].of(self.screened.vertex(local)).iter();
+                self.append_row(row.map(|&(column, value)| (column, f64::from(value))), -boundary.values[at], out);
+            }
+        }
     }
 
     /// Appends the row given for a vertex, unknown or around, times a factor.
     fn append(&self, local: usize, factor: f64, out: &mut Vec<(u32, f64)>) {
+        self.append_row(self.screened.row(local).iter().copied(), factor, out);
+    }
+
+    fn append_row(&self, row: impl Iterator<Item = (u32, f64)>, factor: f64, out: &mut Vec<(u32, f64)>) {
         let columns = 0..self.columns.len();
-        out.extend(self.screened.row(local).iter().filter_map(|&(column, value)| {
+        out.extend(row.filter_map(|(column, value)| {
             let slot = (self.places[column as usize] as usize).wrapping_sub(self.first);
             columns.contains(&slot).then_some((slot as u32, factor * value))
         }));
@@ -217,7 +299,10 @@ impl<'b> Group<'_, 'b> {
         }
         let boundary = &self.screened.block.boundary;
         for at in boundary.starts[k]..boundary.starts[k + 1] {
-            self.append(self.screened.count() + boundary.columns[at] as usize, -boundary.values[at], out);
+            let local = self.screened.count() + boundary.columns[at] as usize;
+            if self.screened.held(local).is_none() {
+                self.append(local, -boundary.values[at], out);
+            }
         }
     }
 }

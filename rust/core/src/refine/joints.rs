@@ -15,6 +15,10 @@ const REACH: f64 = 7.0;
 /// A bone shorter than this many radii has no direction of its own; the next one along the limb is taken with it.
 const SHORTEST: f64 = 1.5;
 
+/// Skin farther from the bones than this many radii is not a limb's, and at most this share of a limb's is so far.
+const SLIM: f32 = 2.5;
+const MOST_FAR: f64 = 0.1;
+
 /// A joint bent further than this at rest (radians), as a hip is, has a torso above it and not a limb.
 const MOST_BENT: f32 = 1.05;
 
@@ -41,6 +45,8 @@ pub(super) struct Joint {
     pub(super) axis: Axis,
     /// Median distance of skin from the bones.
     pub(super) radius: f32,
+    /// Whether what is beside it lies close around the bones, so that the ends of its region move rigidly about the joint.
+    pub(super) is_slim: bool,
     /// Whether both bones run through a limb, so that a plane between them makes sense.
     pub(super) is_limb: bool,
     /// Lattice nodes and surface vertices.
@@ -77,8 +83,9 @@ impl Joint {
             axis = directions(skeleton, bone, parent, SHORTEST * radius)?;
         }
         let members = members(&family, places, &axis, radius);
-        let is_limb = is_limb(skeleton, bone, parent, &axis, &skin, radius);
-        Some(Self { bone, parent, axis, radius: radius as f32, is_limb, members })
+        let is_slim = is_slim(&members, nodes, radius as f32);
+        let is_limb = is_slim && is_limb(skeleton, bone, parent, &axis, &skin, radius);
+        Some(Self { bone, parent, axis, radius: radius as f32, is_slim, is_limb, members })
     }
 }
 
@@ -142,6 +149,13 @@ fn members(family: &[u32], places: &[DVec3], axis: &Axis, radius: f64) -> Vec<Me
     };
     let reach = (REACH * radius) as f32;
     family.iter().map(member).filter(|m| m.along < reach && m.distance < reach).collect()
+}
+
+/// Little skin beside the joint is far from the bones: at a shoulder, the chest is.
+fn is_slim(members: &[Member], nodes: usize, radius: f32) -> bool {
+    let beside = members.iter().filter(|m| m.particle as usize >= nodes && m.along < 2.0 * radius);
+    let (far, all) = beside.fold((0, 0), |(far, all), m| (far + usize::from(m.distance > SLIM * radius), all + 1));
+    far as f64 <= MOST_FAR * f64::from(all)
 }
 
 /// Both bones are longer than the limb is thick, and the skin around the joint lies at about one distance from them.

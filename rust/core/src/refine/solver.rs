@@ -416,12 +416,14 @@ impl Frame<'_> {
         (moved, left)
     }
 
-    /// Restores the volume of joint `k`; returns the share that is missing then.
+    /// Restores the volume about a limb's joint; returns the share that is missing then. Elsewhere the ends of the region
+    /// hardly move rigidly about it, so that the body's whole volume decides if it is known; beside a chest not at all.
     fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) -> f64 {
-        if self.settings.volume == 0.0 {
+        let joint = self.active[k].joint;
+        let is_measured = joint.is_limb || joint.is_slim && !self.has_whole(pose);
+        if self.settings.volume == 0.0 || !is_measured {
             return f64::NAN;
         }
-        let joint = self.active[k].joint;
         let mut contacts = self.contacts(k, axis);
         contacts.extend(parted);
         let kept = within(&self.local, &contacts, KEPT * joint.radius);

@@ -22,8 +22,7 @@ impl Frame<'_> {
     /// is where dual quaternions have the mesh' vertices (mesh units).
     pub(super) fn inflate_whole(&mut self, axes: &[Axis], pose: &[DAffine3], skin: &[[f32; 3]], parted: &[u32]) {
         let trunk: Vec<usize> = (0..self.active.len()).filter(|&k| !self.active[k].joint.is_limb).collect();
-        let is_rigid = (0..self.active.len()).all(|k| (self.growth(k, pose) - 1.0).abs() < RIGID);
-        if self.settings.volume == 0.0 || trunk.is_empty() || !is_rigid || !self.prepared.surface.is_closed {
+        if self.settings.volume == 0.0 || trunk.is_empty() || !self.has_whole(pose) {
             return;
         }
         let (missing, whole) = self.missing(skin);
@@ -43,6 +42,12 @@ impl Frame<'_> {
         balloon.inflate(&mut self.local, axes[trunk[0]].origin, target, first.radius, |local| {
             limits.iter().for_each(|&(k, limits)| local.limit_skin(kernel, k, limits));
         });
+    }
+
+    /// Whether the body's volume is known, and that of rest.
+    pub(super) fn has_whole(&self, pose: &[DAffine3]) -> bool {
+        let is_rigid = |k: usize| (self.growth(k, pose) - 1.0).abs() < RIGID;
+        self.prepared.surface.is_closed && (0..self.active.len()).all(is_rigid)
     }
 
     /// The volume that is missing, in cells, and all of it at rest.

@@ -51,6 +51,10 @@ pub(super) fn kept(
     rows: &RowTable,
 ) -> Ragged<f64> {
     let place = |i: usize| {
+        if rows.of(i).is_empty() {
+            // Nobody asks for its edges.
+            return Place { point: DVec3::ZERO, gap: 0.0, cosine: 0.0 };
+        }
         let (point, (gap, cosine)) = (matches.mean_position(source, i), matches.gap_and_cosine(i));
         Place { point, gap, cosine }
     };

@@ -9,6 +9,7 @@
 mod detail;
 mod islands;
 mod matching;
+mod near;
 mod normals;
 mod pipeline;
 mod prepared;

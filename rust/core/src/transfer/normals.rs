@@ -19,27 +19,19 @@ pub(super) struct Normals {
 impl Normals {
     /// Area-weighted normals of a welded mesh. Where opposite faces cancel, the side of the first face stands for both.
     pub fn of_target(mesh: &TriMesh<'_>) -> Self {
-        let sums = mesh.vertex_area_vectors();
-        let sizes = area_sums(mesh);
-        let two_sided: Vec<bool> = std::iter::zip(&sums, &sizes).map(|(&sum, &size)| cancels(sum, size)).collect();
-        let mut of_vertex: Vec<Vec3> = sums.iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect();
-        if two_sided.contains(&true) {
-            let sides = first_sides(mesh, &two_sided);
-            for (i, _) in two_sided.iter().enumerate().filter(|(_, two_sided)| **two_sided) {
-                of_vertex[i] = sides[i].normalize_or_zero().as_vec3();
-            }
-        }
-        Self { of_vertex, two_sided }
+        let mut sums = mesh.vertex_area_vectors();
+        let two_sided = choose_sides(mesh, &area_sums(mesh), &mut sums);
+        Self { of_vertex: unit(sums), two_sided }
     }
 }
 
 /// Normals of a source: area-weighted over all vertices that are one, except where they face both ways: there each has its
-/// own side's.
+/// own side's. Where opposite faces cancel at one vertex, the side of the first face stands for both.
 pub(super) fn of_source(mesh: &TriMesh<'_>, weld: Option<&Weld>) -> Vec<Vec3> {
-    let own = mesh.vertex_area_vectors();
-    let Some(weld) = weld else { return unit(own) };
     let sizes = area_sums(mesh);
-    let mut sums = own;
+    let mut sums = mesh.vertex_area_vectors();
+    choose_sides(mesh, &sizes, &mut sums);
+    let Some(weld) = weld else { return unit(sums) };
     for class in 0..weld.class_count() {
         let members = weld.members(class);
         let sum: DVec3 = members.iter().map(|&i| sums[i as usize]).sum();
@@ -48,6 +40,18 @@ pub(super) fn of_source(mesh: &TriMesh<'_>, weld: Option<&Weld>) -> Vec<Vec3> {
         }
     }
     unit(sums)
+}
+
+/// Gives the vertices whose area vectors cancel those of their first side; returns which they are (V).
+fn choose_sides(mesh: &TriMesh<'_>, sizes: &[f64], sums: &mut [DVec3]) -> Vec<bool> {
+    let two_sided: Vec<bool> = std::iter::zip(&*sums, sizes).map(|(&sum, &size)| cancels(sum, size)).collect();
+    if two_sided.contains(&true) {
+        let sides = first_sides(mesh, &two_sided);
+        for (i, _) in two_sided.iter().enumerate().filter(|(_, two_sided)| **two_sided) {
+            sums[i] = sides[i];
+        }
+    }
+    two_sided
 }
 
 fn unit(sums: Vec<DVec3>) -> Vec<Vec3> {

@@ -5,11 +5,11 @@ use super::matching::{DISTANCE_REFERENCE, Terms};
 use super::report::{Report, Stages};
 use super::smooth::{push_normalised, region, smooth};
 use super::{
-    Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, detail, small_islands,
+    Criteria, Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, Transfer, detail, near, small_islands,
 };
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
-use crate::fill::{Constraint, Filled, Row};
+use crate::fill::{Constraint, Filled, Row, Screen};
 use crate::limit::limit;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
@@ -102,17 +102,38 @@ pub(super) fn solve(
     progress.report(0.7);
     progress.check()?;
     stages.end("factor");
-    let (weights, report) = filled(prepared, &problem, mask, progress, |filled| {
+    let keeps = near::keeps(prepared, settings);
+    let ((weights, report), found) = filled(prepared, &problem, mask, keeps, progress, |filled| {
         let (raw_minimum, largest_residual) = (filled.minimum(), filled.largest_residual());
-        (gather(prepared, filled), Report { raw_minimum, largest_residual, ..Report::default() })
+        let report = Report { raw_minimum, largest_residual, factored_blocks, ..Report::default() };
+        ((gather(prepared, filled), report), keeps.then(|| filled.found()))
     })?;
     let confidence = prepared.matches.confidence(&problem.constraints, settings.softness, mask);
-    let matched = trusted(&confidence);
-    let report = report.of_problem(prepared, &problem, &matched);
+    let report = report.of_problem(prepared, &problem, &trusted(&confidence));
     stages.end("solve");
     let weights = inpaint_masked(prepared, weights, &problem, mask, settings, progress)?;
-    let prepared = &*prepared;
     stages.end("inpaint");
+    prepared.base = found.map(|found| near::Base::new(&problem, mask, settings, found, &weights));
+    finish(prepared, Solved { problem, weights, confidence, report, stages }, settings, progress)
+}
+
+/// What has been solved, before islands without a match have their weights.
+pub(super) struct Solved {
+    pub problem: Problem,
+    pub weights: Weights,
+    pub confidence: Vec<f32>,
+    pub report: Report,
+    pub stages: Stages,
+}
+
+/// The steps after filling: smoothing, islands, limit.
+pub(super) fn finish(
+    prepared: &Inpainting,
+    solved: Solved,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Transfer> {
+    let Solved { problem, weights, confidence, report, mut stages } = solved;
     let weights = smoothed(prepared, weights, &problem, settings, progress)?;
     stages.end("smooth");
     progress.check()?;
@@ -123,8 +144,9 @@ pub(super) fn solve(
     let weights = limit(weights, settings.max_influences);
     stages.end("islands and limit");
     let seconds = prepared.preparation.iter().copied().chain(stages.into_seconds()).collect();
-    let report = Report { unmatched_islands, rigid_islands, factored_blocks, seconds, ..report };
+    let report = Report { unmatched_islands, rigid_islands, seconds, ..report };
     let (distances, angles) = (prepared.matches.distances(), prepared.matches.angles().to_vec());
+    let matched = trusted(&confidence);
     Ok(Transfer { report: report.counting(&weights), weights, matched, confidence, distances, angles })
 }
 
@@ -133,6 +155,7 @@ pub(super) fn filled<T>(
     prepared: &Inpainting,
     problem: &Problem,
     mask: Option<&[MaskValue]>,
+    with_all_solves: bool,
     progress: &Progress,
     take: impl FnOnce(&Filled<'_>) -> T,
 ) -> Result<T> {
@@ -145,7 +168,8 @@ pub(super) fn filled<T>(
     let rows = fill.row_table(&own);
     let kept = detail::kept(source, matches, fill, &problem.constraints, &rows);
     let own = |i: u32, row: &mut Row| row.extend(rows.of(i as usize));
-    Ok(take(&fill.solve_screened(&own, &rows, &kept, progress)?))
+    let screen = Screen { rows: &rows, kept: &kept, patch: None, with_all_solves };
+    Ok(take(&fill.solve_screened(&own, screen, progress)?))
 }
 
 /// With [`MatchMethod::Confidence`], vertices that the mask says to inpaint are filled in last, by the paper's energy between

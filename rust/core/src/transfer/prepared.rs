@@ -1,6 +1,7 @@
 //! A target prepared on a source: matching found once, factorisations kept.
 
 use super::matching::Matches;
+use super::near::{self, Base};
 use super::pipeline::{self, Problem};
 use super::report::Stages;
 use super::target::{Target, TargetMesh};
@@ -21,6 +22,9 @@ pub struct Inpainting {
     pub(super) target: Target,
     pub(super) matches: Matches,
     pub(super) preparation: Vec<(&'static str, f64)>,
+    /// Whether solves are kept for [`Self::solve_near`], and the last one.
+    pub(super) keeps_solves: bool,
+    pub(super) base: Option<Base>,
 }
 
 /// Raw solutions, before clamping and normalising, for checks against other solvers.
@@ -49,7 +53,8 @@ impl Inpainting {
         stages.end("match");
         progress.report(0.4);
         progress.check()?;
-        Ok(Self { source, target, matches, preparation: stages.into_seconds() })
+        let preparation = stages.into_seconds();
+        Ok(Self { source, target, matches, preparation, keeps_solves: false, base: None })
     }
 
     /// Distance of each vertex (V) to its point on the source, world units.
@@ -73,6 +78,7 @@ impl Inpainting {
     /// Those of [`Source::with_weights`].
     pub fn set_source_weights(&mut self, weights: Weights) -> Result<()> {
         self.source = self.source.with_weights(weights)?;
+        self.base = None;
         self.matches.refresh_weighted(&self.source);
         Ok(())
     }
@@ -110,6 +116,35 @@ impl Inpainting {
         Ok(self.target.expand_transfer(transfer))
     }
 
+    /// The same for a stroke of the mask, sooner: only the neighbourhood of what has changed since the last [`Self::solve`] is
+    /// solved again, and [`Report::solved_near`](super::Report::solved_near) says so. Other rows are as they were, which they
+    /// would not be quite. A solve that nothing can be kept from, a change of settings, of many vertices or of a small mesh is
+    /// solved as a whole.
+    ///
+    /// # Errors
+    /// Those of [`Self::solve`].
+    pub fn solve_near(
+        &mut self,
+        mask: Option<&[MaskValue]>,
+        settings: &Settings,
+        progress: &Progress,
+    ) -> Result<Transfer> {
+        let of_target = self.prepare_for(mask, settings)?;
+        self.keeps_solves = true;
+        match near::solve(self, of_target.as_deref(), settings, progress)? {
+            None => self.solve(mask, settings, progress),
+            Some(transfer) => {
+                progress.report(1.0);
+                Ok(self.target.expand_transfer(transfer))
+            }
+        }
+    }
+
+    /// Whether [`Self::solve_near`] has a solve of the whole to start from.
+    pub fn has_base(&self) -> bool {
+        self.base.is_some()
+    }
+
     /// The solutions of the blocks as they are, for checks against other solvers.
     ///
     /// # Errors
@@ -126,7 +161,7 @@ impl Inpainting {
         let vertices: Vec<u32> = (0..class_of.len() as u32).filter(is_unknown).collect();
         let n_bones = self.source.n_bones() as usize;
         let mut values = vec![0.0; vertices.len() * n_bones];
-        pipeline::filled(self, &problem, mask.as_deref(), &progress, |filled| {
+        pipeline::filled(self, &problem, mask.as_deref(), false, &progress, |filled| {
             let mut row = Row::new();
             for (&i, values) in std::iter::zip(&vertices, values.chunks_exact_mut(n_bones.max(1))) {
                 row.clear();
@@ -142,6 +177,9 @@ impl Inpainting {
         settings.check()?;
         let is_another = self.target.weld_again(settings.weld_tolerance)?;
         let criteria = Criteria::new(settings, &self.source, &self.target);
+        if is_another {
+            self.base = None;
+        }
         if is_another || self.matches.differ(settings.method, settings.average_ties) {
             self.matches = Matches::find(settings.method, &self.source, self.target.surface(), &criteria);
         } else {

@@ -31,6 +31,9 @@ pub struct Report {
     pub blocks: usize,
     /// See `blocks`.
     pub factored_blocks: usize,
+    /// Vertices that were solved again after a stroke, if not all were: see
+    /// [`Inpainting::solve_near`](super::Inpainting::solve_near).
+    pub solved_near: Option<usize>,
     /// Bones with any weight in the result.
     pub bones_used: usize,
     /// Most influences of any vertex in the result.

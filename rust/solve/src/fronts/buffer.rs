@@ -35,6 +35,17 @@ impl Buffer {
     }
 }
 
+impl Buffer {
+    /// At least so many numbers of a buffer that is used again and again, whatever they are.
+    pub(crate) fn at_least(kept: &mut Option<Self>, len: usize) -> &mut [f64] {
+        if kept.as_ref().is_none_or(|kept| kept.len < len) {
+            // First give back what is too short.
+            *kept = None;
+        }
+        &mut kept.get_or_insert_with(|| Self::zeroed(len))[..len]
+    }
+}
+
 fn huge_pages(len: usize) -> Option<MmapMut> {
     let pages = MmapMut::map_anon(len * size_of::<f64>()).ok()?;
     #[cfg(target_os = "linux")]

@@ -12,9 +12,10 @@ use crate::fronts::tree::Tree;
 use crate::ordering::dissection::dissect;
 use crate::ordering::graph::Graph;
 use crate::substitute::backward::backward;
-use crate::substitute::forward::{activity, forward};
+use crate::substitute::forward::{Stacks, activity, forward};
+use crate::substitute::rows::{SparseRows, Sum};
 use crate::substitute::solution::{Part, RightHandSides, Solution};
-use crate::substitute::sparse::{self, SparseRows};
+use crate::substitute::sparse::{self, Workspace};
 use crate::substitute::substitution::Columns;
 use crate::{Failure, SymmetricMatrix};
 
@@ -61,7 +62,8 @@ impl Multifrontal {
             let mut values = Buffer::zeroed(rhs.size() * width);
             let given = Columns { rhs, first, count }.by_front(&self.tree);
             let active = activity(&self.tree, &given, Some((count, width)));
-            forward(&self.tree, &self.panels, self.arch, &given, &active, Some(width), &mut values);
+            let stacks = &mut Stacks::default();
+            forward(&self.tree, &self.panels, self.arch, &given, &active, Some(width), &mut values, stacks);
             backward(&self.tree, &self.panels, self.arch, width, &mut values);
             Part { values, width, count }
         };
@@ -72,12 +74,13 @@ impl Multifrontal {
     /// Solves for rows that are mostly zero up to the `least` magnitude of each unknown; see [`sparse::solve`].
     pub(crate) fn solve_sparse<'f>(
         &'f self,
-        rows: &SparseRows<'f>,
+        rows: &Sum<'_, 'f>,
         least: &dyn Fn(usize) -> f64,
+        work: &mut Workspace,
         stop: &AtomicBool,
     ) -> SparseRows<'f> {
         let least: Vec<f64> = self.tree.order.iter().map(|&unknown| least(unknown as usize)).collect();
-        sparse::solve((&self.tree, &self.panels, self.arch), rows, &least, stop)
+        sparse::solve((&self.tree, &self.panels, self.arch), rows, &least, work, stop)
     }
 
     /// The fronts.

@@ -48,6 +48,8 @@ pub(crate) struct Tree {
     pub(crate) order: Vec<u32>,
     /// Place of each unknown.
     pub(crate) place: Vec<u32>,
+    /// Front that holds each place.
+    pub(crate) front_of: Vec<u32>,
 }
 
 impl Tree {
@@ -56,7 +58,8 @@ impl Tree {
         let mut fronts = bare_fronts(&nodes);
         let roots = [fronts.len() - 1];
         find_rows(&mut fronts, &roots, 0, &|front| coupled_later(graph, &order, &place, front));
-        Self { fronts, order, place }
+        let front_of = fronts.iter().zip(0..).flat_map(|(front, k)| std::iter::repeat_n(k, front.columns)).collect();
+        Self { fronts, order, place, front_of }
     }
 
     pub(crate) fn root(&self) -> usize {

@@ -104,7 +104,16 @@ pub(crate) fn activity(tree: &Tree, given: &impl Given, full: Option<(usize, usi
     all
 }
 
-/// Fills `x`, all zero, in elimination order: (n, `full_width`), or the `active` columns of each front, one after the other.
+/// What fronts pass on to their parents.
+#[derive(Debug, Default)]
+pub(crate) struct Stacks {
+    own: Option<Buffer>,
+    other: Option<Buffer>,
+}
+
+/// Fills `x` in elimination order: (n, `full_width`), all zero before, or the `active` columns of each front, one after the
+/// other.
+#[allow(clippy::too_many_arguments)]
 pub(crate) fn forward(
     tree: &Tree,
     panels: &[f64],
@@ -113,6 +122,7 @@ pub(crate) fn forward(
     active: &[Active],
     full_width: Option<usize>,
     x: &mut [f64],
+    stacks: &mut Stacks,
 ) {
     let mut panel_starts = Vec::with_capacity(tree.fronts.len());
     let mut subtree_store: Vec<usize> = Vec::with_capacity(tree.fronts.len());
@@ -126,9 +136,10 @@ pub(crate) fn forward(
     let plan = Plan::new(tree, |index| passed_len(&tree.fronts[index], &active[index]));
     let root = tree.root();
     let (own, other) = plan.stacks(root);
-    let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
+    let own = Buffer::at_least(&mut stacks.own, own);
+    let other = Buffer::at_least(&mut stacks.other, other);
     let pass = ForwardPass { tree, panels, panel_starts, arch, given, active, full_width, subtree_store };
-    let Ok(()) = walk(tree, &plan, &pass, root, x, &mut own, &mut other);
+    let Ok(()) = walk(tree, &plan, &pass, root, x, own, other);
 }
 
 fn passed_len(front: &Front, active: &Active) -> usize {
@@ -177,7 +188,10 @@ impl<G: Given> Visit for ForwardPass<'_, G> {
                     kept.iter().zip(y).for_each(|(&column, &value)| x[column] = value);
                 }
             }
-            _ => {
+            full => {
+                if full.is_none() {
+                    x.fill(0.0);
+                }
                 self.given.put(index, active, x);
                 self.front(index, x, passed, &received);
             }

@@ -2,6 +2,7 @@
 
 pub(crate) mod backward;
 pub(crate) mod forward;
+pub(crate) mod rows;
 pub(crate) mod solution;
 pub(crate) mod sparse;
 pub(crate) mod substitution;

@@ -1,0 +1,305 @@
+//! The neighbourhood of a stroke of the mask, solved again by itself, so that an artist sees at once what it does.
+//!
+//! What a stroke changes dies away within a few of the lengths that rows are trusted over. The last solve of the whole mesh is
+//! kept; after a stroke the vertices within [`REACH`] such lengths of the change are solved, at most [`MOST`] of them, held
+//! around at what was found before ([`Patch`]). Rows farther away stay. The exact answer is another solve of the whole, which
+//! does not depend on what came before; the caller asks for it once the artist has seen this one.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::pipeline::{self, Problem, Solved, trusted};
+use super::report::Stages;
+use super::smooth::push_normalised;
+use super::{Inpainting, MaskValue, MatchMethod, Report, Settings, Transfer, detail};
+use crate::error::Result;
+use crate::fill::{Constraint, Fill, Found, Patch, Row, Screen};
+use crate::progress::Progress;
+use crate::weights::Weights;
+
+/// How far a change is followed, in lengths over which it falls to a third.
+const REACH: f64 = 8.0;
+/// No such length counts for more than this share of the source's size: what is trusted over more has little say.
+const LONGEST: f64 = 0.1;
+/// Most vertices that are solved near a stroke.
+const MOST: usize = 20_000;
+/// Rows whose weights change by less stay as they are: to write them would take longer than to see a difference.
+const NOTICEABLE: f32 = 1e-4;
+/// Fewer unknowns than this are solved as fast as a whole.
+const FEW: usize = 2 * MOST;
+/// With more, what would have to be kept takes too much memory.
+const MANY: usize = 300_000;
+
+/// A solve of the whole mesh.
+#[derive(Debug)]
+pub(super) struct Base {
+    settings: Settings,
+    mask: Option<Vec<MaskValue>>,
+    constraints: Vec<Constraint>,
+    found: Found,
+    /// The rows, before anything is done about islands.
+    weights: Weights,
+}
+
+impl Base {
+    pub fn new(
+        problem: &Problem,
+        mask: Option<&[MaskValue]>,
+        settings: &Settings,
+        found: Found,
+        weights: &Weights,
+    ) -> Self {
+        let (mask, constraints) = (mask.map(<[MaskValue]>::to_vec), problem.constraints.clone());
+        Self { settings: settings.clone(), mask, constraints, found, weights: weights.clone() }
+    }
+
+    fn mask(&self, i: usize) -> MaskValue {
+        of_mask(self.mask.as_deref(), i)
+    }
+
+    /// The vertices of which something else is known now.
+    fn changed(&self, problem: &Problem, mask: Option<&[MaskValue]>) -> Vec<u32> {
+        let differs = |i: usize| {
+            let (now, before) = (of_mask(mask, i), self.mask(i));
+            problem.constraints[i] != self.constraints[i] || now != before
+        };
+        (0..self.constraints.len()).filter(|&i| differs(i)).map(|i| i as u32).collect()
+    }
+}
+
+fn of_mask(mask: Option<&[MaskValue]>, i: usize) -> MaskValue {
+    mask.map_or(MaskValue::Automatic, |mask| mask[i])
+}
+
+/// Whether the solve of a problem that is factored is worth keeping.
+pub(super) fn keeps(prepared: &Inpainting, settings: &Settings) -> bool {
+    let unknowns = || prepared.target.fill.unknown().iter().filter(|&&unknown| unknown).count();
+    prepared.keeps_solves
+        && settings.method == MatchMethod::Confidence
+        && settings.smoothing_iterations == 0
+        && (FEW..=MANY).contains(&unknowns())
+}
+
+/// Solves near what has changed since the kept solve, on the mesh that is solved on; None if the whole is to be solved.
+///
+/// # Errors
+/// Those of [`Inpainting::solve`].
+pub(super) fn solve(
+    prepared: &mut Inpainting,
+    mask: Option<&[MaskValue]>,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Option<Transfer>> {
+    let Some(base) = prepared.base.take().filter(|base| base.settings == *settings) else { return Ok(None) };
+    let transfer = solve_from(prepared, &base, mask, settings, progress);
+    prepared.base = Some(base);
+    transfer
+}
+
+fn solve_from(
+    prepared: &mut Inpainting,
+    base: &Base,
+    mask: Option<&[MaskValue]>,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Option<Transfer>> {
+    let mut stages = Stages::start();
+    let problem = Problem::new(prepared, mask, settings)?;
+    let changed = base.changed(&problem, mask);
+    if changed.len() > MOST / 4 || lacks_rows(prepared, &problem, mask) {
+        return Ok(None);
+    }
+    let region = Region::around(&prepared.target.fill, &problem, &changed, LONGEST * prepared.source.size());
+    stages.end("assemble");
+    let (weights, report) = screened(prepared, base, &problem, mask, &region, progress)?;
+    let confidence = prepared.matches.confidence(&problem.constraints, settings.softness, mask);
+    let report = report.of_problem(prepared, &problem, &trusted(&confidence));
+    let report = Report { solved_near: Some(region.vertices.len()), ..report };
+    stages.end("solve");
+    let weights = inpainted(prepared, weights, &problem, mask, &region, settings, progress)?;
+    stages.end("inpaint");
+    let solved = Solved { problem, weights, confidence, report, stages };
+    pipeline::finish(prepared, solved, settings, progress).map(Some)
+}
+
+/// Whether vertices that the mask leaves alone have no row: where there is a mask, they are inpainted too, which changes with
+/// its first stroke.
+fn lacks_rows(prepared: &Inpainting, problem: &Problem, mask: Option<&[MaskValue]>) -> bool {
+    let unknown = |i: usize| problem.constraints[i] == Constraint::Free && of_mask(mask, i) != MaskValue::Inpaint;
+    let islands = prepared.target.fill.islands().of_vertex();
+    let on_reached = |i: usize| problem.has_match.get(islands[i] as usize).is_some_and(|&has_match| has_match);
+    (0..islands.len()).any(|i| unknown(i) && on_reached(i))
+}
+
+/// The vertices that are solved again.
+struct Region {
+    vertices: Vec<u32>,
+    /// (V)
+    contains: Vec<bool>,
+}
+
+impl Region {
+    /// The vertices near the `changed` ones, the nearest first; `longest` is the length that counts at most.
+    fn around(fill: &Fill, problem: &Problem, changed: &[u32], longest: f64) -> Self {
+        let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
+        let rate = |i: usize| {
+            let confidence = if let Constraint::Soft(confidence) = problem.constraints[i] { confidence } else { 0.0 };
+            (confidence / laplacian.mass(i).max(f64::MIN_POSITIVE)).sqrt().max(1.0 / longest)
+        };
+        let mut distance = vec![f64::INFINITY; problem.constraints.len()];
+        let mut region = Self { vertices: Vec::new(), contains: vec![false; distance.len()] };
+        changed.iter().for_each(|&i| distance[i as usize] = 0.0);
+        // Distances are not negative, so their bits order as they do.
+        let mut queue: BinaryHeap<Reverse<(u64, u32)>> = changed.iter().map(|&i| Reverse((0, i))).collect();
+        while let Some(Reverse((bits, i))) = queue.pop() {
+            if std::mem::replace(&mut region.contains[i as usize], true) {
+                continue;
+            }
+            region.vertices.push(i);
+            if region.vertices.len() == MOST {
+                break;
+            }
+            for &j in laplacian.neighbours(i as usize) {
+                let length = mesh.position(i).distance(mesh.position(j));
+                let there = f64::from_bits(bits) + length * (rate(i as usize) + rate(j as usize)) / 2.0;
+                let is_open = problem.constraints[j as usize] != Constraint::Fixed;
+                if is_open && there <= REACH && there < distance[j as usize] {
+                    distance[j as usize] = there;
+                    queue.push(Reverse((there.to_bits(), j)));
+                }
+            }
+        }
+        region
+    }
+
+    /// With the neighbours of its vertices, (V).
+    fn widened(&self, fill: &Fill) -> Vec<bool> {
+        let mut wider = self.contains.clone();
+        for &i in &self.vertices {
+            fill.laplacian().neighbours(i as usize).iter().for_each(|&j| wider[j as usize] = true);
+        }
+        wider
+    }
+}
+
+/// The rows of all vertices, those of the region solved again.
+fn screened(
+    prepared: &mut Inpainting,
+    base: &Base,
+    problem: &Problem,
+    mask: Option<&[MaskValue]>,
+    region: &Region,
+    progress: &Progress,
+) -> Result<(Weights, Report)> {
+    let known = &problem.constraints;
+    let of_region = |i: usize| if region.contains[i] { known[i] } else { Constraint::Fixed };
+    let constraints: Vec<Constraint> = (0..known.len()).map(of_region).collect();
+    let fill = &mut prepared.target.fill;
+    let assembled = fill.assemble(constraints.clone(), 0.0, progress)?;
+    let factored_blocks = assembled.missing_blocks();
+    fill.factor(assembled, progress)?;
+    progress.report(0.5);
+    let Inpainting { source, matches, target, .. } = &*prepared;
+    let fill = &target.fill;
+    let wider = region.widened(fill);
+    let own = |i: u32, row: &mut Row| {
+        if wider[i as usize] && known[i as usize].is_known() {
+            matches.append_row(source, mask, i, row);
+        }
+    };
+    let rows = fill.row_table(&own);
+    let kept = detail::kept(source, matches, fill, &constraints, &rows);
+    let is_held: Vec<bool> = (0..known.len()).map(|i| !region.contains[i] && known[i] != Constraint::Fixed).collect();
+    let patch = Some(Patch { found: &base.found, is_held: &is_held });
+    let given = |i: u32, row: &mut Row| row.extend(rows.of(i as usize));
+    let screen = Screen { rows: &rows, kept: &kept, patch, with_all_solves: false };
+    let filled = fill.solve_screened(&given, screen, progress)?;
+    let (raw_minimum, largest_residual) = (filled.minimum(), filled.largest_residual());
+    let report = Report { raw_minimum, largest_residual, factored_blocks, ..Report::default() };
+    let append = |i: usize, row: &mut Row| filled.append_row(i, row);
+    Ok((replaced(&base.weights, &region.contains, append), report))
+}
+
+/// The rows of `weights`, those `chosen` (V) replaced by what `append` appends, clamped and normalised.
+fn replaced(weights: &Weights, chosen: &[bool], append: impl Fn(usize, &mut Row) + Sync) -> Weights {
+    Weights::from_rows(weights.vertex_count(), weights.n_bones(), Vec::new, |row, i, out| {
+        if chosen[i] {
+            row.clear();
+            append(i, row);
+            push_normalised(row, out);
+        }
+        if !chosen[i] || is_nearly(out, weights.row(i)) {
+            out.clear();
+            out.extend(std::iter::zip(weights.row(i).0, weights.row(i).1).map(|(&bone, &value)| (bone, value)));
+        }
+    })
+}
+
+/// Whether no weight of a row differs noticeably from that of another, both by bone.
+fn is_nearly(row: &[(u32, f32)], (bones, values): (&[u32], &[f32])) -> bool {
+    let mut others = std::iter::zip(bones, values).peekable();
+    for &(bone, value) in row {
+        while let Some((_, &other)) = others.next_if(|&(&other, _)| other < bone) {
+            if other >= NOTICEABLE {
+                return false;
+            }
+        }
+        let other = others.next_if(|&(&other, _)| other == bone).map_or(0.0, |(_, &other)| other);
+        if (value - other).abs() >= NOTICEABLE {
+            return false;
+        }
+    }
+    row.is_empty() == bones.is_empty() && others.all(|(_, &other)| other < NOTICEABLE)
+}
+
+/// The vertices that the mask says to inpaint are filled in, where anything has changed around them.
+fn inpainted(
+    prepared: &mut Inpainting,
+    weights: Weights,
+    problem: &Problem,
+    mask: Option<&[MaskValue]>,
+    region: &Region,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Weights> {
+    let chosen = touched(&prepared.target.fill, mask, region);
+    if !chosen.contains(&true) {
+        return Ok(weights);
+    }
+    let on_reached = |i: usize| {
+        let island = prepared.target.fill.islands().of_vertex()[i];
+        problem.has_match.get(island as usize).is_some_and(|&has_match| has_match)
+    };
+    let constraint = |i: usize| if chosen[i] || !on_reached(i) { Constraint::Free } else { Constraint::Fixed };
+    let constraints = (0..chosen.len()).map(constraint).collect();
+    let length = settings.smoothness_length.of(prepared.source.diagonal());
+    let fill = &mut prepared.target.fill;
+    let assembled = fill.assemble(constraints, length, progress)?;
+    fill.factor(assembled, progress)?;
+    let given = |i: u32, row: &mut Row| {
+        let (bones, values) = weights.row(i as usize);
+        row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value))));
+    };
+    let filled = fill.solve(&given, progress)?;
+    Ok(replaced(&weights, &chosen, |i, row| filled.append_row(i, row)))
+}
+
+/// Which vertices that the mask says to inpaint hang together with the region, (V): the energy couples two-rings.
+fn touched(fill: &Fill, mask: Option<&[MaskValue]>, region: &Region) -> Vec<bool> {
+    let mut chosen = vec![false; region.contains.len()];
+    let Some(mask) = mask.filter(|mask| mask.contains(&MaskValue::Inpaint)) else { return chosen };
+    let mut open = region.vertices.clone();
+    while let Some(i) = open.pop() {
+        let mut reach = |j: u32| {
+            if mask[j as usize] == MaskValue::Inpaint && !std::mem::replace(&mut chosen[j as usize], true) {
+                open.push(j);
+            }
+        };
+        reach(i);
+        for &j in fill.laplacian().neighbours(i as usize) {
+            reach(j);
+            fill.laplacian().neighbours(j as usize).iter().for_each(|&k| reach(k));
+        }
+    }
+    chosen
+}
