@@ -66,8 +66,11 @@ fn bind_is_one_sided_and_planes_leave_their_own_side_alone() {
     let back = bind(&axis, Vec3::new(0.3, 2.0, 0.0), 0.0, 1.0);
     assert!((back - Vec3::new(0.0, -1.0, 0.0)).length() < 1e-6);
     let plane = HalfSpace { origin: Vec3::ZERO, normal: Vec3::X, gap: 0.1 };
-    assert_eq!(self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), 1.0), Vec3::ZERO);
-    assert!((self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), -1.0) - Vec3::new(-0.3, 0.0, 0.0)).length() < 1e-6);
+    assert_eq!(self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), plane.heights(1.0)), Vec3::ZERO);
+    assert!(
+        (self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), plane.heights(-1.0)) - Vec3::new(-0.3, 0.0, 0.0)).length()
+            < 1e-6
+    );
 }
 
 /// One particle under limits.
@@ -89,14 +92,10 @@ fn limits_of_eight_lanes_are_bind_and_plane_one_after_the_other() {
         for side in [1.0, -1.0, 0.0] {
             let distance = 0.2 + noise(k).abs();
             let bound = at + bind(&axis, at, 0.0, most * distance);
-            let expected = if side == 0.0 {
-                bound + plane.back(bound, plane.heights(side))
-            } else {
-                bound + self_collision(&plane, bound, side)
-            };
+            let expected = bound + self_collision(&plane, bound, plane.heights(side));
             assert!(limited(limits, at, [distance, side]).distance(expected) < 1e-5);
             assert!(limited(free, at, [distance, side]).distance(at) < 1e-6);
-            let node = if side == 0.0 { at } else { at + self_collision(&plane, at, side) };
+            let node = if side == 0.0 { at } else { at + self_collision(&plane, at, plane.heights(side)) };
             assert!(limited(OfNodes(plane_alone), at, [side]).distance(node) < 1e-5);
         }
     }
