@@ -22,6 +22,8 @@ const WIDEST: f32 = 1.4;
 const STEP: f32 = 0.15;
 /// How far a round moves them and the ring around towards the mean of their neighbours.
 const SMOOTHING: f32 = 0.3;
+/// Times that it is looked whether pushing has made other pairs.
+const CHECKS: usize = 3;
 /// Rings around the first contacts in which new ones are looked for.
 const RINGS: usize = 10;
 
@@ -148,10 +150,36 @@ impl Contact {
         farthest: f32,
         slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
-        let mut pairs = self.own_pairs(skin, places, suspects, cleared, slabs);
-        if pairs.is_empty() {
-            return (Vec::new(), 0);
+        let (mut pairs, mut moved) = (self.own_pairs(skin, places, suspects, cleared, slabs), Vec::new());
+        for _ in 0..CHECKS {
+            if pairs.is_empty() {
+                break;
+            }
+            let (pushed, left) = self.push_apart(skin, places, pairs, farthest, slabs);
+            let has_moved: HashSet<u32> = pushed.iter().copied().collect();
+            moved.extend(pushed);
+            pairs = left;
+            if !pairs.is_empty() {
+                break;
+            }
+            // Pushing looks around the pairs alone, and may have pressed them into what lies on the other side.
+            let still = |t: u32| !skin.triangles()[t as usize].iter().any(|i| has_moved.contains(i));
+            pairs = self.own_pairs(skin, places, suspects, &still, slabs);
         }
+        moved.sort_unstable();
+        moved.dedup();
+        (moved, pairs.len())
+    }
+
+    /// Pushes `pairs` apart; returns the vertices that moved, and the pairs that remain around them.
+    fn push_apart(
+        &self,
+        skin: &dyn Skin,
+        places: &mut Vec<Vec3>,
+        mut pairs: Vec<[u32; 2]>,
+        farthest: f32,
+        slabs: &Slabs,
+    ) -> (Vec<u32>, Vec<[u32; 2]>) {
         let around = grown(skin, corners(skin, &pairs), RINGS);
         let near: HashSet<u32> = around.iter().copied().collect();
         let among: Vec<u32> = (0..skin.triangles().len() as u32)
@@ -180,9 +208,7 @@ impl Contact {
                 }
             }
         }
-        moved.sort_unstable();
-        moved.dedup();
-        (moved, pairs.len())
+        (moved, pairs)
     }
 }
 

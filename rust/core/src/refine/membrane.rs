@@ -2,7 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
-use super::constraint::HalfSpace;
+use super::constraint::{HalfSpace, self_collision};
 use super::joints::Member;
 use super::local::Local;
 
@@ -81,14 +81,15 @@ impl Membrane {
                 middle
             };
             let at = here.truncate() + by;
-            let back = if side.is_nan() { Vec3::ZERO } else { plane.back(at, heights) };
+            let back = if side.is_nan() { Vec3::ZERO } else { self_collision(plane, at, heights) };
             *next = (at + back).extend(here.w);
         }
         std::mem::swap(&mut self.places, &mut self.next);
     }
 }
 
-/// Vertices with their sides, all that have equally many neighbours one after the other: loops of one length are predicted.
+/// Vertices with their sides, all that have equally many neighbours one after the other: loops of one length are
+/// predicted.
 fn by_valence(local: &Local, vertices: &[u32], members: &[Member]) -> Vec<(u32, f32)> {
     let mut rest = members.iter().peekable();
     let with_side = |&p: &u32| {

@@ -177,21 +177,20 @@ impl Refiner {
         }
         if self.settings.self_collision && quality == Quality::Bake {
             let start = std::time::Instant::now();
-            self.part_limbs(&mut positions, &solution.cleared, &solution.slabs);
+            self.part_limbs(&mut positions, &solution.slabs);
             solution.report.stages.push(("limbs", start.elapsed().as_secs_f64() * 1e3));
         }
         solution.report.stages.insert(0, ("skin", skinned));
         Ok((positions, solution.report))
     }
 
-    /// Limb against limb, limb against torso: over the whole skin, but for pairs of the triangles `cleared`.
-    fn part_limbs(&self, positions: &mut [[f32; 3]], cleared: &[u32], slabs: &Slabs) {
+    /// Limb against limb, limb against torso: over the whole skin. Regions are looked at once more, as rounding from cells to
+    /// mesh units lets triangles intersect that touched.
+    fn part_limbs(&self, positions: &mut [[f32; 3]], slabs: &Slabs) {
         let surface = &self.prepared.surface;
-        let mut is_cleared = vec![false; surface.triangles.len()];
-        cleared.iter().for_each(|&t| is_cleared[t as usize] = true);
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
         let triangles: Vec<u32> = (0..surface.triangles.len() as u32).collect();
-        let suspects = Suspects { triangles: &triangles, cleared: &|t| is_cleared[t as usize] };
+        let suspects = Suspects { triangles: &triangles, cleared: &|_| false };
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
         let before = places.clone();
         if self.prepared.contact.part(surface, &mut places, suspects, farthest, slabs).0.is_empty() {

@@ -89,14 +89,6 @@ impl Quality {
         }
     }
 
-    /// Times that tetrahedra turned inside out are looked for at the end.
-    pub(super) fn untangling(self) -> usize {
-        match self {
-            Self::Live => 2,
-            Self::Bake => 12,
-        }
-    }
-
     /// Times that the volume is restored and the folds that this makes are taken out.
     pub(super) fn balloons(self) -> usize {
         match self {

@@ -15,7 +15,7 @@ use super::membrane::Membrane;
 use super::pairs::Slabs;
 use super::predictor::{follow, linear, place_all, place_bound, skinned};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
-use super::projection::{Flesh, Kernel, Limits, Stretch, project, untangle};
+use super::projection::{Flesh, Kernel, Limits, Stretch, fill, project, untangle};
 use super::report::{JointMeasure, JointReport, Report};
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -36,6 +36,8 @@ pub(super) const KEPT: f32 = 0.3;
 pub(super) const IN_CONTACT: f32 = 0.04;
 /// Passes over the creases in each iteration.
 const PASSES: usize = 2;
+/// Times that tetrahedra turned inside out are looked for at the end.
+const UNTANGLING: usize = 24;
 /// Loss of a joint's volume from which it is asked whether skinning did better.
 const HARM: f64 = 0.1;
 /// How far, in cells, skin that has come through skin is moved back.
@@ -65,8 +67,6 @@ pub(super) struct Solution {
     /// Surface vertices that the solver moved, and their places in cells.
     pub(super) moved: Vec<(u32, Vec3)>,
     pub(super) report: Report,
-    /// Triangles of the surface of which no two intersect that do not at rest.
-    pub(super) cleared: Vec<u32>,
     /// Across which triangles are told apart.
     pub(super) slabs: Slabs,
 }
@@ -92,27 +92,17 @@ pub(super) fn solve(
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
     if active.is_empty() {
-        return Solution { moved: Vec::new(), report: Report::default(), cleared: Vec::new(), slabs: Slabs::new([]) };
+        return Solution { moved: Vec::new(), report: Report::default(), slabs: Slabs::new([]) };
     }
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let slabs = slabs(&active, pose);
     let membranes = active.iter().map(|_| None).collect();
-    let mut frame = Frame {
-        prepared,
-        settings,
-        active: &active,
-        local,
-        kernel,
-        clock,
-        iterations: 0,
-        slabs,
-        membranes,
-        is_clear: false,
-    };
+    let mut frame =
+        Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
-    Solution { moved: frame.moved(), report, cleared: frame.cleared(), slabs: frame.slabs }
+    Solution { moved: frame.moved(), report, slabs: frame.slabs }
 }
 
 /// Across the planes of the joints that bend most.
@@ -134,18 +124,7 @@ pub(super) fn measure(
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
     let (slabs, membranes) = (Slabs::new([]), Vec::new());
-    let frame = Frame {
-        prepared,
-        settings,
-        active: &active,
-        local,
-        kernel,
-        clock,
-        iterations: 0,
-        slabs,
-        membranes,
-        is_clear: false,
-    };
+    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -172,8 +151,6 @@ pub(super) struct Frame<'a> {
     slabs: Slabs,
     /// Of every joint with skin in contact, for the iterations of one step.
     membranes: Vec<Option<Membrane>>,
-    /// Whether it is known that no triangles of the region intersect that do not at rest.
-    is_clear: bool,
 }
 
 impl Frame<'_> {
@@ -238,7 +215,7 @@ impl Frame<'_> {
             project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
         }
         if settings.volume > 0.0 && untangles {
-            untangle(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8, 1);
+            fill(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8);
         }
     }
 
@@ -312,14 +289,18 @@ impl Frame<'_> {
                     &local.region.tetrahedra,
                     TETRAHEDRON,
                     &mut local.particles,
-                    [0.05, 0.3],
-                    8,
-                    quality.untangling(),
+                    [0.05, 0.2],
+                    3,
+                    UNTANGLING,
                 );
             });
         }
-        let (mut parted, mut left, mut lost) = (Vec::new(), 0, Vec::new());
-        let mut cleared = Vec::new();
+        let (mut parted, mut left, mut lost, mut cleared) = (Vec::new(), 0, Vec::new(), Vec::new());
+        // Planes leave few folds, and balloons none more. Hips have no planes: what parting costs there is restored.
+        if self.active.iter().any(|active| !active.joint.is_limb) {
+            (parted, left) = clock.time("contact", || self.part(&suspects, &[]));
+            cleared = if left == 0 { self.places() } else { Vec::new() };
+        }
         for _ in 0..quality.balloons() {
             lost = clock.time("balloon", || {
                 let lost = (0..self.active.len()).map(|k| self.inflate(k, &axes[k], pose, &parted)).collect();
@@ -328,17 +309,17 @@ impl Frame<'_> {
             });
             let (more, pairs) = clock.time("contact", || self.part(&suspects, &cleared));
             left = pairs;
-            if more.is_empty() {
+            let is_done = more.is_empty();
+            parted.extend(more);
+            if is_done {
                 break;
             }
             // What does not move from here on is known to be clear of each other.
             cleared = if left == 0 { self.places() } else { Vec::new() };
-            parted.extend(more);
         }
         if self.prepared.surface.islands > 1 && self.settings.self_collision {
             left = clock.time("contact", || self.pairs(&self.places()).len());
         }
-        self.is_clear = left == 0 && suspects.len() == self.local.triangles.len();
         clock.time("contact", || self.undo_harm(pose, &axes, &lost, left));
         self.clock = clock;
     }
@@ -399,7 +380,6 @@ impl Frame<'_> {
 
     /// Puts a joint's skin where skinning has it.
     fn give_back(&mut self, k: usize, skin: &[Vec3]) {
-        self.is_clear = false;
         let Local { region, particles, .. } = &mut self.local;
         for member in region.free[k].iter().chain(&region.beyond[k]) {
             let particle = &mut particles[member.particle as usize];
@@ -506,10 +486,6 @@ impl Frame<'_> {
         let (volume_after, bulge_after) = self.measure(k, pose, axis, &|p| place(&self.local.particles[p as usize]));
         let (angle, is_limb) = (path.angle(joint.bone), joint.is_limb);
         JointReport { bone: joint.bone, angle, volume_before, volume_after, bulge_before, bulge_after, is_limb }
-    }
-
-    fn cleared(&self) -> Vec<u32> {
-        if self.is_clear { self.local.region.triangle_names.clone() } else { Vec::new() }
     }
 
     /// Surface vertices of the whole that this frame placed: free ones, and those bound near a limb's joint.

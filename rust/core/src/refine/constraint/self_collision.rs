@@ -14,10 +14,8 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Heights that hold for what the plane does not concern.
-    pub const ANYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
-
-    /// Lowest and highest that a point may be above the plane; skin that lies in it at rest stays between the two sides.
+    /// Lowest and highest that a point may be above the plane, by its side as in [`Self::depth`]; skin that lies in it at
+    /// rest stays between the two sides.
     pub fn heights(&self, side: f32) -> [f32; 2] {
         if side > 0.0 {
             [self.gap, f32::INFINITY]
@@ -28,13 +26,6 @@ impl HalfSpace {
         }
     }
 
-    /// The move that brings a point to these heights, if it is not there.
-    pub fn back(&self, point: Vec3, [lowest, highest]: [f32; 2]) -> Vec3 {
-        let height = (point - self.origin).dot(self.normal);
-        // Not `clamp`: it panics without an order between the two, as a pose that is not a number leaves it.
-        self.normal * (height.max(lowest).min(highest) - height)
-    }
-
     /// How far inside of its half `point` lies, negative beyond the plane; `side` is +1 for the child's, -1 for the
     /// parent's, 0 for what lies in the plane.
     pub fn depth(&self, point: Vec3, side: f32) -> f32 {
@@ -42,8 +33,9 @@ impl HalfSpace {
     }
 }
 
-/// The move that brings `point` back to its own half, if it is not there.
-pub fn self_collision(plane: &HalfSpace, point: Vec3, side: f32) -> Vec3 {
-    let depth = plane.depth(point, side);
-    if depth < 0.0 { plane.normal * (-depth * side) } else { Vec3::ZERO }
+/// The move that brings `point` back between the lowest and the highest that it may be above the plane.
+pub fn self_collision(plane: &HalfSpace, point: Vec3, [lowest, highest]: [f32; 2]) -> Vec3 {
+    let height = (point - plane.origin).dot(plane.normal);
+    // Not `clamp`: it panics without an order between the two, as a pose that is not a number leaves it.
+    plane.normal * (height.max(lowest).min(highest) - height)
 }

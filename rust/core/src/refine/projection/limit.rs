@@ -11,7 +11,7 @@ use super::kind::Kind;
 const FAR: f32 = 1e30;
 
 /// Limits of one joint in one step. What they do is [`super::super::constraint::bind`], from above only, and
-/// [`HalfSpace::back`].
+/// [`super::super::constraint::self_collision`].
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     origin: Vector<f32>,

@@ -22,7 +22,7 @@ pub use self::colouring::Colouring;
 pub use self::kind::{Flesh, Kind, Stretch};
 pub use self::limit::{Limits, OfNodes};
 use self::register::Register;
-pub use self::untangle::untangle;
+pub use self::untangle::{fill, untangle};
 use super::number::{LANES, Lanes};
 
 /// How constraints are gone through. The answer is the same, to the bit.

@@ -5,7 +5,10 @@ mod sweeps;
 use glam::Vec3;
 
 use super::constraint::{Axis, HalfSpace, bind, energy, self_collision, stretch, volume};
-use super::projection::{Batch, Blocks, Colouring, Flesh, Kernel, Multipliers, Particle, Stretch, project};
+use super::pairs::{Slabs, intersecting_pairs_of};
+use super::projection::{
+    Batch, Blocks, Colouring, Flesh, Kernel, Kind, Limits, Multipliers, OfNodes, Particle, Stretch, project,
+};
 
 const CORNERS: [[f64; 3]; 4] = [[0.1, 0.2, -0.1], [1.3, 0.0, 0.2], [0.2, 0.9, 0.1], [-0.1, 0.3, 1.4]];
 
@@ -63,8 +66,58 @@ fn bind_is_one_sided_and_planes_leave_their_own_side_alone() {
     let back = bind(&axis, Vec3::new(0.3, 2.0, 0.0), 0.0, 1.0);
     assert!((back - Vec3::new(0.0, -1.0, 0.0)).length() < 1e-6);
     let plane = HalfSpace { origin: Vec3::ZERO, normal: Vec3::X, gap: 0.1 };
-    assert_eq!(self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), 1.0), Vec3::ZERO);
-    assert!((self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), -1.0) - Vec3::new(-0.3, 0.0, 0.0)).length() < 1e-6);
+    assert_eq!(self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), plane.heights(1.0)), Vec3::ZERO);
+    assert!(
+        (self_collision(&plane, Vec3::new(0.2, 5.0, 0.0), plane.heights(-1.0)) - Vec3::new(-0.3, 0.0, 0.0)).length()
+            < 1e-6
+    );
+}
+
+/// One particle under limits.
+fn limited<const M: usize, K: Kind<1, M, 0>>(kind: K, at: Vec3, rest: [f32; M]) -> Vec3 {
+    let mut particles = [[at.x, at.y, at.z, 1.0]];
+    let batch = Batch::new(Blocks::new(0, 1), &Colouring::single(1), &[0], |_| [0], |_| rest);
+    project(Kernel::Lanes, kind, &batch, &mut Multipliers::new(0), &mut particles);
+    Vec3::new(particles[0][0], particles[0][1], particles[0][2])
+}
+
+#[test]
+fn limits_of_eight_lanes_are_bind_and_plane_one_after_the_other() {
+    let axis = Axis { origin: Vec3::new(0.1, -0.2, 0.0), directions: [-Vec3::X, Vec3::new(0.6, 0.8, 0.0)] };
+    let plane = HalfSpace { origin: axis.origin, normal: Vec3::new(0.8, 0.6, 0.0), gap: 0.05 };
+    let (most, limits) = (1.1, Limits::new(&axis, Some(&plane), 1.1));
+    let (free, plane_alone) = (Limits::new(&axis, None, 0.0), Limits::new(&axis, Some(&plane), 0.0));
+    for k in 0..200u32 {
+        let at = Vec3::new(noise(3 * k), noise(3 * k + 1), noise(3 * k + 2)) * 4.0;
+        for side in [1.0, -1.0, 0.0] {
+            let distance = 0.2 + noise(k).abs();
+            let bound = at + bind(&axis, at, 0.0, most * distance);
+            let expected = bound + self_collision(&plane, bound, plane.heights(side));
+            assert!(limited(limits, at, [distance, side]).distance(expected) < 1e-5);
+            assert!(limited(free, at, [distance, side]).distance(at) < 1e-6);
+            let node = if side == 0.0 { at } else { at + self_collision(&plane, at, plane.heights(side)) };
+            assert!(limited(OfNodes(plane_alone), at, [side]).distance(node) < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn slabs_and_cleared_triangles_change_no_pair() {
+    let count = 900u32;
+    let corner = |k: u32| Vec3::new(noise(5 * k), noise(5 * k + 1), noise(5 * k + 2));
+    let small = |k: u32| corner(k / 3) * 2.0 + corner(k + 7000) * 0.3;
+    let places: Vec<Vec3> = (0..3 * count).map(small).collect();
+    let triangles: Vec<[u32; 3]> = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let all: Vec<u32> = (0..count).collect();
+    let normals = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.0, 0.28, 0.96)];
+    let slanting = Slabs::new(normals);
+    let plain = intersecting_pairs_of(&places, &triangles, &all, &|_| false, &Slabs::new([]));
+    assert!(plain.len() > 100);
+    assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &|_| false, &slanting), plain);
+    let cleared = |t: u32| t % 3 != 0;
+    let fresh: Vec<_> = plain.iter().copied().filter(|pair| !pair.iter().all(|&t| cleared(t))).collect();
+    assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &cleared, &slanting), fresh);
+    assert!(fresh.len() < plain.len());
 }
 
 /// Deterministic numbers from -0.5 to 0.5.
