@@ -384,7 +384,7 @@ def test_objects_of_libraries_may_have_the_same_names(addon, tmp_path):
     bpy.ops.skinwright.live_refine()
 
 
-def test_a_character_of_an_overridden_collection_is_previewed(addon, tmp_path):
+def test_a_character_of_a_linked_collection_is_previewed(addon, tmp_path):
     obj, rig = tube()
     collection = bpy.data.collections.new("Character")
     bpy.context.scene.collection.children.link(collection)
@@ -395,8 +395,8 @@ def test_a_character_of_an_overridden_collection_is_previewed(addon, tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
         here.collections = ["Character"]
-    here.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
-    limb = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.override_library)
+    bpy.context.scene.collection.children.link(here.collections[0])
+    limb = next(obj for obj in bpy.context.view_layer.objects if obj.type == "MESH")
     builders.select(limb)
     assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
     assert part(addon, "scene.preview_object").of("Limb").visible_get() and not limb.visible_get()
