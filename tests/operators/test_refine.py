@@ -396,7 +396,7 @@ def test_a_character_of_a_linked_collection_is_previewed(addon, tmp_path):
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
         here.collections = ["Character"]
     bpy.context.scene.collection.children.link(here.collections[0])
-    limb = next(obj for obj in bpy.context.view_layer.objects if obj.type == "MESH")
+    limb = next(obj for obj in bpy.data.objects if obj.type == "MESH")
     builders.select(limb)
     assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
     assert part(addon, "scene.preview_object").of("Limb").visible_get() and not limb.visible_get()
