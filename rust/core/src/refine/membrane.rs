@@ -73,7 +73,13 @@ impl Membrane {
             let sum: Vec4 = ring.iter().map(|&n| self.places[n as usize]).sum();
             let mean = sum / ring.len().max(1) as f32;
             let by = if ring.is_empty() { Vec3::ZERO } else { (mean - here).truncate() * self.smoothing };
-            let heights = if side > 0.0 { child } else if side < 0.0 { parent } else { middle };
+            let heights = if side > 0.0 {
+                child
+            } else if side < 0.0 {
+                parent
+            } else {
+                middle
+            };
             let at = here.truncate() + by;
             let back = if side.is_nan() { Vec3::ZERO } else { plane.back(at, heights) };
             *next = (at + back).extend(here.w);

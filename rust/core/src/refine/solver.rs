@@ -97,7 +97,18 @@ pub(super) fn solve(
     let local = clock.time("region", || Local::new(prepared.kept.region(prepared, &active)));
     let slabs = slabs(&active, pose);
     let membranes = active.iter().map(|_| None).collect();
-    let mut frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
+    let mut frame = Frame {
+        prepared,
+        settings,
+        active: &active,
+        local,
+        kernel,
+        clock,
+        iterations: 0,
+        slabs,
+        membranes,
+        is_clear: false,
+    };
     frame.walk(&path, quality);
     frame.finish(pose, skin, quality);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
@@ -123,7 +134,18 @@ pub(super) fn measure(
     let local = Local::new(prepared.kept.region(prepared, &active));
     let (kernel, clock) = (Kernel::Lanes, Clock::default());
     let (slabs, membranes) = (Slabs::new([]), Vec::new());
-    let frame = Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes, is_clear: false };
+    let frame = Frame {
+        prepared,
+        settings,
+        active: &active,
+        local,
+        kernel,
+        clock,
+        iterations: 0,
+        slabs,
+        membranes,
+        is_clear: false,
+    };
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
@@ -163,7 +185,8 @@ impl Frame<'_> {
     fn walk(&mut self, path: &Path<'_>, quality: Quality) {
         let swing = self.active.iter().map(|active| f64::from(active.swing)).fold(0.0, f64::max);
         let bends = swing > 1f64.to_radians();
-        let steps = if bends { ((swing / quality.sub_angle() - ROUNDING).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
+        let steps =
+            if bends { ((swing / quality.sub_angle() - ROUNDING).ceil() as usize).clamp(1, MOST_STEPS) } else { 1 };
         let twists = !bends || self.active.iter().any(|active| f64::from(active.twist) > TWISTS);
         let least = if twists { TWIST_ITERATIONS.div_ceil(steps) } else { 0 };
         let iterations = quality.iterations().max(least);
