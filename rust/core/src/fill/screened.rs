@@ -225,8 +225,8 @@ impl<'b> Group<'_, 'b> {
     fn solve(&self) -> Result<Solves<'b>> {
         let Screened { confidence, mass, least_ratio, .. } = self.screened;
         let solver = self.solver;
-        let (given, added) =
-            (solver.collect(|k, out| self.append(k, 1.0, out)), solver.collect(|k, out| self.add(k, out)));
+        let add = || solver.collect(|k, out| self.add(k, out));
+        let (given, added) = (solver.collect(|k, out| self.append(k, 1.0, out)), add());
         let (once, pull) = (|_: usize| 1.0, |k: usize| confidence[k]);
         let mut work = Workspace::default();
         let mut solve = |solve: usize, terms: &[Term<'_, 'b>], least: &(dyn Fn(usize) -> f64 + Sync)| {
@@ -238,9 +238,12 @@ impl<'b> Group<'_, 'b> {
         let to_given = |k: usize| scale(k) / (REACH * REACH);
         let to_second = |k: usize| -scale(k) * (1.0 / (REACH * REACH) + 1.0);
         let least = |k: usize| NEGLIGIBLE * (confidence[k] / mass[k]).max(*least_ratio);
+        // It is not needed for the correction, and of a large block memory is scarce.
+        let added = (self.screened.count() <= MANY).then_some(added);
         let correction = solve(CORRECTION, &[(&given, &to_given), (&first, &scale), (&second, &to_second)], &least)?;
         drop(given);
         let first = self.screened.screen.with_all_solves.then_some(first);
+        let added = added.unwrap_or_else(add);
         let corrected: [Term; 3] = [(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)];
         let rows = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
         Ok(Solves { earlier: first.map(|first| [first, second, correction]), rows })
