@@ -73,11 +73,11 @@ class Runner:
             self._answer(self._job)
         return self.done
 
-    def wait(self, seconds: float) -> None:
-        """Give the present job this long to end, with a few looks at it."""
+    def wait(self, seconds: float, look: float = 0.0) -> None:
+        """Give the present job this long to end; look at it every `look` seconds, or a few times if that is 0."""
         end = time.perf_counter() + seconds
         while self._job and not self._job.done and time.perf_counter() < end:
-            time.sleep(max(0.001, 0.25 * seconds))
+            time.sleep(look or max(0.001, 0.25 * seconds))
 
     def cancel(self) -> None:
         """Stop without the steps that are left."""

@@ -123,6 +123,7 @@ def test_a_job_returns_the_same_and_can_be_cancelled():
         (lambda segments, parents: (segments + 99, parents), "outside"),
         (lambda segments, parents: (segments * np.nan, parents), "not finite"),
         (lambda segments, parents: (segments, parents[1:]), "parents"),
+        (lambda segments, parents: (segments, np.roll(np.arange(len(parents)), 1)), "circle"),
     ],
 )
 def test_refusals_are_sentences(change, sentence):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
+bmesh = pytest.importorskip("bmesh", reason="needs the bpy wheel")
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
 SCRIPT = Path(__file__).resolve().parents[2] / "blender_scripts" / "embed_armature.py"
@@ -60,6 +61,35 @@ def test_joints_lie_where_they_belong(man, method, worst, arm_length, lift):
     right = [name.endswith(".R") for name in doll.NAMES]
     assert (heads(rig)[left, 0] > 0.03).all() and (heads(rig)[right, 0] < -0.03).all()
     np.testing.assert_allclose(heads(rig)[left] * [-1, 1, 1], heads(rig)[right], atol=0.02)
+
+
+def by_a_key(obj):
+    """The mesh itself is half as large, and a shape key in use makes it what it was."""
+    obj.shape_key_add(name="Basis")
+    real = obj.shape_key_add(name="Real")
+    real.value = 1
+    for points in (obj.data.vertices, obj.data.shape_keys.reference_key.data):
+        for point in points:
+            point.co *= 0.5
+
+
+def by_a_mirror(obj):
+    """One half of the mesh, and a Mirror modifier."""
+    edited = bmesh.new()
+    edited.from_mesh(obj.data)
+    bmesh.ops.delete(edited, geom=[vertex for vertex in edited.verts if vertex.co.x < -1e-4], context="VERTS")
+    edited.to_mesh(obj.data)
+    obj.modifiers.new("Half", "MIRROR")
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+
+
+@pytest.mark.parametrize("who", ["target", "template"])
+@pytest.mark.parametrize("shaped", [by_a_key, by_a_mirror])
+def test_the_shape_that_is_shown_counts(man, who, shaped):
+    plain = embed(bare("Plain", 0.6))
+    child = bare("Child", 0.6)
+    shaped(child if who == "target" else bpy.data.objects["Man"])
+    assert np.abs(heads(embed(child)) - heads(plain)).max() < 0.02 * HEIGHT
 
 
 def test_nothing_that_is_there_is_changed(man):

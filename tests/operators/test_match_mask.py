@@ -265,6 +265,28 @@ class TestPainting:
         painting.restore()
 
 
+def test_rows_that_differ(addon):
+    """By brute force: rows that grow, shrink, change a bone or a value, and rows that only lie elsewhere now."""
+    module = import_module(f"{PACKAGE}.match.session")
+    rng = np.random.default_rng(3)
+
+    def rows(table):
+        indptr = np.cumsum([0] + [len(row) for row in table]).astype(np.uint32)
+        entries = [entry for row in table for entry in row]
+        bones, values = [b for b, _ in entries], [v for _, v in entries]
+        return addon.csr.Rows(indptr, np.array(bones, np.uint32), np.array(values, np.float32))
+
+    for _ in range(200):
+        before = [[(b, float(rng.integers(3))) for b in range(rng.integers(4))] for _ in range(12)]
+        now = [list(row) for row in before]
+        for i in rng.integers(12, size=3):
+            now[i] = [(b + int(rng.integers(2)), float(rng.integers(3))) for b in range(rng.integers(4))]
+        wanted = [a != b for a, b in zip(now, before, strict=True)]
+        if any(before):
+            assert module.differs(rows(now), rows(before)).tolist() == wanted
+    assert module.differs(rows(now), None).all()
+
+
 class TestStrokesOnALargeTarget:
     """Answered with the rows around them first, and with those of the whole once the brush rests."""
 

@@ -261,6 +261,18 @@ def test_the_shape_that_is_shown_is_refined(addon, tmp_path, fatter):
     np.testing.assert_allclose(shown(obj), expected, atol=1e-3)
 
 
+def test_animated_shape_keys_are_named(addon, tmp_path):
+    obj, rig = tube()
+    bent(rig)
+    fatter_by_key(obj)
+    bake = {"filepath": str(tmp_path / "a.pc2"), "frame_start": 1, "frame_end": 1}
+    bpy.ops.skinwright.bake_refined_cache(**bake)
+    assert not addon.reporting.last.warnings
+    obj.data.shape_keys.key_blocks["Fat"].keyframe_insert("value", frame=1)
+    bpy.ops.skinwright.bake_refined_cache(**bake)
+    assert "Limb has animated shape keys" in addon.reporting.last.warnings[0]
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.1])
 def test_a_mesh_that_is_inside_out_is_refined_as_the_right_one(addon, scale):
     """Of size 1 the lattice of such a mesh was a few cells, and of 1.1 there was none."""
@@ -370,6 +382,26 @@ def test_objects_of_libraries_may_have_the_same_names(addon, tmp_path):
     (copy,) = [obj for obj in bpy.data.objects if obj.get("skinwright_preview_of")]
     assert np.abs(shown(copy) - shown(linked)).max() < 0.01
     bpy.ops.skinwright.live_refine()
+
+
+def test_a_character_of_an_overridden_collection_is_previewed(addon, tmp_path):
+    obj, rig = tube()
+    collection = bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(collection)
+    for part_ in (obj, rig):
+        collection.objects.link(part_)
+        bpy.context.scene.collection.objects.unlink(part_)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
+        here.collections = ["Character"]
+    here.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    limb = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj.override_library)
+    builders.select(limb)
+    assert bpy.ops.skinwright.live_refine() == {"FINISHED"}
+    assert part(addon, "scene.preview_object").of("Limb").visible_get() and not limb.visible_get()
+    bpy.ops.skinwright.live_refine()
+    assert limb.visible_get() and part(addon, "scene.preview_object").of("Limb") is None
 
 
 def test_bones_of_the_command_line_are_those_of_the_armature(addon, tmp_path, capsys):

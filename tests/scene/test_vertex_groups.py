@@ -204,3 +204,18 @@ def test_four_hundred_thousand_entries(vertex_groups, csr):
     vertex_groups.write(obj, names, rows)
     again = vertex_groups.read(obj, names)
     assert all(np.array_equal(before, after) for before, after in zip(rows, again, strict=True))
+
+
+@pytest.mark.parametrize("largest", [0, 1 << 24])
+def test_positions_of_pairs_by_sorting_and_by_table(vertex_groups, monkeypatch, largest):
+    monkeypatch.setattr(vertex_groups, "_LARGEST_TABLE", largest)
+    rng = np.random.default_rng(1)
+    keys = rng.permutation(50 * 9)[:200]
+    wanted = rng.integers(0, 50 * 12, 300)
+    pairs, others = [(k // 12, k % 12) for k in (keys // 9 * 12 + keys % 9, wanted)]
+    found = vertex_groups._positions(pairs, others, 50)
+    places = {(row, group): k for k, (row, group) in enumerate(zip(*pairs, strict=True))}
+    assert found.tolist() == [places.get(pair, -1) for pair in zip(*others, strict=True)]
+    assert 0 < (found >= 0).sum() < 300
+    nothing = (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    assert (vertex_groups._positions(nothing, others, 50) == -1).all()

@@ -12,9 +12,9 @@ from .. import jobs, native
 from ..csr import Rows
 from ..declared import native_keywords
 from ..jobs import Jobs
-from ..retarget import bone_names
-from ..retarget.inputs import joined, joined_rows
-from ..scene import armature, embedded, mesh, object_state, rest_bones
+from ..retarget import bone_names, whole
+from ..retarget.inputs import joined_rows
+from ..scene import armature, embedded, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..scene.watched import Watched
@@ -71,21 +71,23 @@ def steps(
     for obj in targets:
         if params.bind and not obj.is_editable:
             raise SceneError(f"{obj.name} is linked from another file: make it local, or turn Bind off")
-    shapes = [mesh.read(obj) for obj in targets]
-    for obj, shape in zip(targets, shapes, strict=True):
-        if not len(shape.triangles):
+    for obj in targets:
+        if not obj.data.polygons:
             raise SceneError(f"{obj.name} has no faces: bones are laid into a surface, so give it some")
-        _check_extent(obj, shape.positions)
-    positions, triangles, _ = joined(shapes)
+    seen = whole.read(targets)
+    for obj, start, end in zip(targets, seen.starts, seen.starts[1:], strict=False):
+        _check_extent(obj, seen.positions[start:end])
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
     if params.method == "template":
         donor = _donor(context, source, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
-    seen = Watched([source, *targets])
-    embedding = yield native.start_embedding(targets[0].name, (positions, triangles), arrays, donor, **options)
-    seen.check()
+    watched = Watched([source, *targets])
+    embedding = yield native.start_embedding(
+        targets[0].name, (seen.positions, seen.triangles), arrays, donor, **options
+    )
+    watched.check()
     return _write(context, source, list(targets), bones, embedding, params)
 
 
@@ -100,16 +102,15 @@ def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
 def _donor(
     context: bpy.types.Context, source: bpy.types.Object, bones: RestBones
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], Rows]:
-    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups]
+    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(
             f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "
             "or set Method to Shape Alone"
         )
-    shapes = [mesh.read(obj) for obj in meshes]
-    positions, triangles, _ = joined(shapes)
-    _check_extent(meshes[0], positions)
-    return positions, triangles, joined_rows(meshes, bones.names)
+    seen = whole.read(meshes, source)
+    _check_extent(meshes[0], seen.positions)
+    return seen.positions, seen.triangles, seen.rows(joined_rows(meshes, bones.names), source, bones.names)
 
 
 def _check_extent(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:

@@ -166,12 +166,14 @@ def has_any(islands: NDArray[np.uint32], marked: NDArray[np.bool_]) -> NDArray[n
 def differs(rows: csr.Rows, before: csr.Rows | None) -> NDArray[np.bool_]:
     """(V,) the rows that are not bit for bit as before."""
     n = len(rows.indptr) - 1
-    if before is None:
+    if before is None or not before.bones.size:
         return np.ones(n, bool)
     counts = np.diff(rows.indptr)
     changed = counts != np.diff(before.indptr)
-    same = np.flatnonzero(~changed)
-    now, old = csr.take_rows(rows, same), csr.take_rows(before, same)
-    entry = (now.bones != old.bones) | (now.values != old.values)
-    changed[same[csr.entry_vertices(now)[entry]]] = True
+    # Where each entry was before, if its row had as many.
+    moved = np.where(changed, 0, before.indptr[:-1].astype(np.int64) - rows.indptr[:-1])
+    at = np.arange(len(rows.bones), dtype=np.int64) + np.repeat(moved, counts)
+    at = np.minimum(at, len(before.bones) - 1)
+    entry = np.flatnonzero((rows.bones != before.bones[at]) | (rows.values != before.values[at]))
+    changed[np.searchsorted(rows.indptr, entry, side="right") - 1] = True
     return changed

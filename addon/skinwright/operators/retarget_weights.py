@@ -5,7 +5,7 @@ from bpy.types import Context, Event, Object
 from .. import jobs, preferences
 from ..registration import registration
 from ..retarget import RetargetReport, steps
-from ..scene import armature, attributes
+from ..scene import armature, attributes, mesh
 from ..settings.properties import last_used
 from ..settings.retarget import RetargetSettings
 from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
@@ -34,7 +34,8 @@ class SKINWRIGHT_OT_retarget_weights(LongWork, RetargetSettings, SkinwrightOpera
         for name in RetargetSettings.__annotations__:
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(settings, name))
-        if sum(len(obj.data.vertices) for obj in targets(context)) < LONG_WORK_VERTICES:
+        vertices = sum(len(obj.data.vertices) for obj in targets(context))
+        if vertices < LONG_WORK_VERTICES or context.mode == "EDIT_MESH":
             return self.execute(context)
         return self.attempt(lambda: self.begin(context, self._steps(context)))
 
@@ -46,7 +47,8 @@ class SKINWRIGHT_OT_retarget_weights(LongWork, RetargetSettings, SkinwrightOpera
 
     def work(self, context: Context) -> set[str]:
         """Retarget, and say in a line what was done."""
-        return self.complete(context, jobs.wait(self._steps(context)))
+        with mesh.object_mode(context):
+            return self.complete(context, jobs.wait(self._steps(context)))
 
     def complete(self, context: Context, report: RetargetReport) -> set[str]:
         """Say what was done, and leave what it was done with to the panel."""

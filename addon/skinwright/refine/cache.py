@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import bpy
@@ -25,18 +25,19 @@ class CacheReport:
     target: str
     path: str
     frames: int
+    warnings: list[str] = field(default_factory=list)
 
     def sentence(self) -> str:
         """One line for the status bar."""
         return f"{self.target}: {self.frames} refined frames in {self.path}"
 
     def all_warnings(self) -> list[str]:
-        """Nothing to warn of."""
-        return []
+        """Sentences worth a look."""
+        return self.warnings
 
     def to_json(self) -> dict[str, object]:
         """Plain values."""
-        return {"target": self.target, "path": self.path, "frames": self.frames}
+        return asdict(self)
 
 
 def steps(
@@ -75,7 +76,16 @@ def steps(
     with object_state.all_or_nothing([obj]):
         mesh_cache.play(obj, path, kind, first)
         files.write_whole(path, content)
-    return CacheReport(obj.name, str(path), len(positions))
+    return CacheReport(obj.name, str(path), len(positions), _warnings(obj))
+
+
+def _warnings(obj: bpy.types.Object) -> list[str]:
+    """Shape keys that the frames change: the shape of when baking began is in all frames."""
+    keys = obj.data.shape_keys
+    if not (keys and keys.animation_data and keys.animation_data.action):
+        return []
+    frame = bpy.context.scene.frame_current
+    return [f"{obj.name} has animated shape keys: the cache holds them as they are at frame {frame}"]
 
 
 def _bytes(character: characters.Character, frames: int) -> int:

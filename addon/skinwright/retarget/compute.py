@@ -59,4 +59,4 @@ def _beside_locked(pair: Pair, rows: Rows, params: RetargetParams) -> Rows:
 
 def _arrays(character: Character) -> tuple[Any, ...]:
     bones = character.bones
-    return character.positions, character.triangles, bones.frames, bones.lengths
+    return character.positions, character.whole.triangles, bones.frames, bones.lengths

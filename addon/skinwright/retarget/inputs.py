@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, editable, landmarks, mesh, rest_bones, vertex_groups
+from ..scene import armature, editable, landmarks, rest_bones, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import merging
-from . import bone_map
+from . import bone_map, whole
 from .bone_map import BoneMatch
 from .params import RetargetParams
+from .whole import Whole
 
 
 @dataclass(frozen=True)
@@ -25,9 +26,17 @@ class Character:
     armature: bpy.types.Object
     bones: RestBones
     meshes: list[bpy.types.Object]
-    positions: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
-    starts: list[int]
+    whole: Whole
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """Of all vertices, those of mirrored halves last."""
+        return self.whole.positions
+
+    @property
+    def starts(self) -> list[int]:
+        """Of each mesh, and the end of the last."""
+        return self.whole.starts
 
 
 @dataclass(frozen=True)
@@ -100,7 +109,7 @@ def _source(context: bpy.types.Context, source: bpy.types.Object) -> Character:
     rig = source if source.type == "ARMATURE" else armature.find(source)
     if rig is None:
         raise SceneError(f"{source.name} has no armature: pick the source's armature, or give it an Armature modifier")
-    meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups]
+    meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(f"{rig.name} deforms no mesh that has weights: pick the armature of a skinned character")
     return _character(rig, meshes)
@@ -122,15 +131,7 @@ def by_character(
 
 
 def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:
-    positions, triangles, starts = joined([mesh.read(obj) for obj in meshes])
-    return Character(rig, rest_bones_of(rig), meshes, positions, triangles, starts)
-
-
-def joined(parts: list[mesh.Geometry]) -> tuple[NDArray[np.float32], NDArray[np.uint32], list[int]]:
-    """Positions and triangles of all parts as one mesh, and where each part's vertices start."""
-    starts = np.cumsum([0, *(len(part.positions) for part in parts)], dtype=np.int64).tolist()
-    moved = [part.triangles + np.uint32(start) for part, start in zip(parts, starts[:-1], strict=True)]
-    return np.concatenate([part.positions for part in parts]), np.concatenate(moved), starts
+    return Character(rig, rest_bones_of(rig), meshes, whole.read(meshes, rig))
 
 
 def joined_rows(meshes: Sequence[bpy.types.Object], names: Sequence[str]) -> Rows:
@@ -139,10 +140,11 @@ def joined_rows(meshes: Sequence[bpy.types.Object], names: Sequence[str]) -> Row
 
 
 def _rows(source: Character) -> Rows:
-    rows = joined_rows(source.meshes, source.bones.names)
+    names = source.bones.names
+    rows = source.whole.rows(joined_rows(source.meshes, names), source.armature, names)
     if not csr.row_sums(rows).any():
-        names = ", ".join(obj.name for obj in source.meshes)
-        raise SceneError(f"{names}: no vertex follows a deforming bone of {source.armature.name}; paint weights first")
+        listed = ", ".join(obj.name for obj in source.meshes)
+        raise SceneError(f"{listed}: no vertex follows a deforming bone of {source.armature.name}; paint weights first")
     return rows
 
 
@@ -173,6 +175,8 @@ def _landmarks(source: Character, target: Character, params: RetargetParams) -> 
 def _vertex(character: Character, name: str, vertex: int) -> int:
     place = landmarks.place_of_empty(name)
     if place is not None:
+        if not np.isfinite(place).all():
+            raise SceneError(f"The landmark {name} is nowhere: give it a location of numbers")
         return int(np.linalg.norm(character.positions - place, axis=1).argmin())
     for obj, start, end in zip(character.meshes, character.starts, character.starts[1:], strict=False):
         if obj.name == name:

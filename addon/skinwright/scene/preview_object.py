@@ -28,7 +28,8 @@ def show(obj: bpy.types.Object) -> bpy.types.Object:
     copy.animation_data_clear()
     copy.hide_select = copy.hide_render = True
     copy[MARK] = obj.name
-    for collection in obj.users_collection:
+    own = [c for c in obj.users_collection if c.is_editable and not c.override_library]
+    for collection in own or [bpy.context.scene.collection]:  # those of libraries take nothing in
         collection.objects.link(copy)
     for view in _local_views(obj):
         copy.local_view_set(view, True)

@@ -62,6 +62,12 @@ impl BiharmonicEmbedding {
         &self.values[i * self.columns..][..self.columns]
     }
 
+    /// The same with the row of vertex `of[i]` for vertex i.
+    pub fn at(&self, of: &[u32]) -> Self {
+        let values = of.iter().flat_map(|&i| self.row(i as usize)).copied().collect();
+        Self { columns: self.columns, values }
+    }
+
     /// All coordinates, (V, columns) row-major.
     pub fn into_values(self) -> Vec<f64> {
         self.values

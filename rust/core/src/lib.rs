@@ -16,6 +16,7 @@
 pub mod adjacency;
 pub mod autoskin;
 pub mod biharmonic;
+mod bones;
 pub mod desparsify;
 pub mod embed;
 mod error;

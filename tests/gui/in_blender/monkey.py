@@ -66,6 +66,16 @@ def weights_and_rest(obj: bpy.types.Object) -> tuple:
     return names, rows, np.array([v.co for v in obj.data.vertices], np.float32).tobytes()
 
 
+def _difference(before: tuple, now: tuple) -> str:
+    """What is not the same, in short."""
+    if before[0] != now[0]:
+        return f"groups {before[0]} are {now[0]}"
+    if len(before[1]) != len(now[1]) or before[2] != now[2]:
+        return f"{len(before[1])} vertices are {len(now[1])}, or lie elsewhere"
+    wrong = [i for i, (old, new) in enumerate(zip(before[1], now[1], strict=True)) if old != new]
+    return f"{len(wrong)} rows, first {wrong[0]}: {before[1][wrong[0]]} is {now[1][wrong[0]]}"
+
+
 class Monkey:
     def __init__(self, window: Window, seed: int) -> None:
         self.window, self.random = window, random.Random(seed)
@@ -319,7 +329,8 @@ class Monkey:
         obj = next((o for o in bpy.data.objects if o.session_uid == uid), None)
         foreign = {"remesh", "delete", "our_operator"}
         if by == "escape" and obj and before and not foreign & set(self.since):
-            assert weights_and_rest(obj) == before, "Esc has left something"
+            now = weights_and_rest(obj)
+            assert now == before, f"Esc has left something of {obj.name}, {self.since}: {_difference(before, now)}"
             self.checked += 1
 
 

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::bones::parents_first;
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 
@@ -71,9 +72,9 @@ impl Skeleton<'_> {
             if self.length(j) == 0.0 {
                 return invalid(format!("bone {j} has no length; move its tail away from its head, or leave it out"));
             }
-            if self.parent(j).is_some_and(|parent| parent >= self.len() || parent == j) {
-                return invalid(format!("bone {j} has the parent {}, which is not another bone", self.parents[j]));
-            }
+        }
+        if let Err(j) = parents_first(self.parents) {
+            return invalid(format!("the parents of bone {j} lead in a circle or to a bone that is not there"));
         }
         if self.is_far_from(mesh) {
             let advice = "apply the scale of both, or move the armature into the mesh";

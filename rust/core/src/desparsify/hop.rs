@@ -1,11 +1,10 @@
 //! Candidates by distance in the bone hierarchy.
 
-use crate::error::{Error, Result};
 use crate::weights::Weights;
 
-/// Fills each row with the bones of highest score, score(b) = sum over influences i of w_i 0.5^hops(i, b).
-pub(super) fn fill(kept: &Weights, n: usize, parents: &[i32], locked: &[bool]) -> Result<Weights> {
-    let proximity = proximities(parents)?;
+/// `order` has parents first. Fills each row with the bones of highest score, score(b) = sum over influences i of w_i 0.5^hops(i, b).
+pub(super) fn fill(kept: &Weights, n: usize, parents: &[i32], order: &[usize], locked: &[bool]) -> Weights {
+    let proximity = proximities(parents, order);
     let count = parents.len();
     let open: Vec<f64> = locked.iter().map(|&locked| if locked { NEVER } else { 0.0 }).collect();
     let row = |score: &mut Vec<f64>, i: usize, out: &mut Vec<(u32, f32)>| {
@@ -20,7 +19,7 @@ pub(super) fn fill(kept: &Weights, n: usize, parents: &[i32], locked: &[bool]) -
         out.extend(best(score, n.saturating_sub(bones.len())).into_iter().map(|bone| (bone, 0.0)));
         out.sort_unstable_by_key(|&(bone, _)| bone);
     };
-    Ok(Weights::from_rows(kept.vertex_count(), kept.n_bones(), || vec![0.0; count], row))
+    Weights::from_rows(kept.vertex_count(), kept.n_bones(), || vec![0.0; count], row)
 }
 
 /// The score of a bone that may not be given.
@@ -46,10 +45,9 @@ fn best(score: &[f64], wanted: usize) -> Vec<u32> {
 /// 0.5^hops between all bones, (B, B), zero between bones under different roots.
 ///
 /// Hops follow from those of the parent: hops(b, x) = hops(parent(b), x) + 1 for every x that comes before b.
-fn proximities(parents: &[i32]) -> Result<Vec<f64>> {
+fn proximities(parents: &[i32], order: &[usize]) -> Vec<f64> {
     let count = parents.len();
     let mut proximity = vec![0.0; count * count];
-    let order = parents_first(parents)?;
     for (seen, &b) in order.iter().enumerate() {
         if let Ok(parent) = usize::try_from(parents[b]) {
             for &x in &order[..seen] {
@@ -60,27 +58,5 @@ fn proximities(parents: &[i32]) -> Result<Vec<f64>> {
         }
         proximity[b * count + b] = 1.0;
     }
-    Ok(proximity)
-}
-
-/// All bones, each after its parent.
-fn parents_first(parents: &[i32]) -> Result<Vec<usize>> {
-    let invalid = |value: i32, must| Err(Error::InvalidParameter { name: "bone_parents", value: value.into(), must });
-    if let Some(&parent) = parents.iter().find(|&&p| p >= parents.len() as i32) {
-        return invalid(parent, "a parent must be one of the bones, or -1");
-    }
-    let mut depth = vec![0usize; parents.len()];
-    for bone in 0..parents.len() {
-        let mut ancestor = parents[bone];
-        while let Ok(parent) = usize::try_from(ancestor) {
-            depth[bone] += 1;
-            if depth[bone] > parents.len() {
-                return invalid(parents[bone], "no bone may be its own ancestor");
-            }
-            ancestor = parents[parent];
-        }
-    }
-    let mut order: Vec<usize> = (0..parents.len()).collect();
-    order.sort_by_key(|&bone| depth[bone]);
-    Ok(order)
+    proximity
 }

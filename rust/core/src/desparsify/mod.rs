@@ -7,6 +7,7 @@ mod surface;
 
 use glam::{DVec3, Vec3};
 
+use crate::bones::parents_first;
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 use crate::weights::Weights;
@@ -65,14 +66,14 @@ pub fn desparsify(
     skeleton: &Skeleton<'_>,
     mesh: Option<&TriMesh<'_>>,
 ) -> Result<Weights> {
-    check(weights, n, skeleton)?;
+    let order = check(weights, n, skeleton)?;
     let mut locked = skeleton.locked.to_vec();
     locked.resize(weights.n_bones() as usize, false);
     let keep =
         |row: &mut Vec<(u32, f64)>, i: usize, out: &mut Vec<(u32, f32)>| keep(weights.row(i), n, &locked, row, out);
     let kept = Weights::from_rows(weights.vertex_count(), weights.n_bones(), Vec::new, keep);
     match method {
-        Method::Hop => hop::fill(&kept, n, skeleton.parents, &locked),
+        Method::Hop => Ok(hop::fill(&kept, n, skeleton.parents, &order, &locked)),
         Method::Surface => {
             Ok(surface::fill(&kept, n, surface_of(weights, mesh)?, &segments(weights, skeleton)?, &locked))
         }
@@ -104,7 +105,8 @@ fn keep(
     out.extend(row.iter().map(|&(bone, value)| (bone, value as f32)));
 }
 
-fn check(weights: &Weights, n: usize, skeleton: &Skeleton<'_>) -> Result<()> {
+/// The bones with parents first.
+fn check(weights: &Weights, n: usize, skeleton: &Skeleton<'_>) -> Result<Vec<usize>> {
     let bones = weights.n_bones() as usize;
     if n == 0 {
         return Err(Error::InvalidParameter { name: "n", value: 0.0, must: "every vertex needs at least one bone" });
@@ -113,7 +115,11 @@ fn check(weights: &Weights, n: usize, skeleton: &Skeleton<'_>) -> Result<()> {
     if !skeleton.locked.is_empty() {
         check_length("locked", skeleton.locked.len(), bones)?;
     }
-    Ok(())
+    parents_first(skeleton.parents).map_err(|bone| {
+        let (value, must) =
+            (skeleton.parents[bone].into(), "a parent must be another bone and not below its child, or -1");
+        Error::InvalidParameter { name: "bone_parents", value, must }
+    })
 }
 
 fn surface_of<'a, 'm>(weights: &Weights, mesh: Option<&'a TriMesh<'m>>) -> Result<&'a TriMesh<'m>> {

@@ -9,6 +9,7 @@ mod template;
 
 use glam::{DVec3, Vec3};
 
+use crate::bones::parents_first;
 use crate::error::{Error, Result};
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
@@ -74,20 +75,9 @@ impl Template<'_> {
         if let Some(j) = (0..self.len()).find(|&j| !finite(&self.heads[j]) || !finite(&self.tails[j])) {
             return invalid(format!("bone {j} has a head or tail that is not finite"));
         }
-        let climbs_out = |j: usize| {
-            let mut above = Some(j);
-            for _ in 0..=self.len() {
-                above = match above {
-                    Some(j) if j < self.len() => self.parent(j),
-                    Some(_) => return false,
-                    None => return true,
-                };
-            }
-            false
-        };
-        match (0..self.len()).find(|&j| !climbs_out(j)) {
-            Some(j) => invalid(format!("the parents of bone {j} lead in a circle or to a bone that is not there")),
-            None => Ok(()),
+        match parents_first(self.parents) {
+            Err(j) => invalid(format!("the parents of bone {j} lead in a circle or to a bone that is not there")),
+            Ok(_) => Ok(()),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use crate::bones::parents_first;
 use crate::error::{Error, Result};
 
 /// Bones at rest: parents and segments, in any one space.
@@ -28,11 +29,12 @@ impl Skeleton {
         if let Some(&value) = segments.iter().flatten().flatten().find(|x| !x.is_finite()) {
             return invalid("bone_segments", value, "every head and tail must be finite");
         }
-        if let Some(&value) = parents.iter().find(|&&p| p >= bone_count as i32) {
-            return invalid("bone_parents", f64::from(value), "every parent must be a bone, or negative for a root");
-        }
-        let Some(order) = parents_first(parents) else {
-            return invalid("bone_parents", f64::NAN, "no bone may be above itself");
+        let order = match parents_first(parents) {
+            Ok(order) => order,
+            Err(bone) => {
+                let must = "a parent must be another bone and not below its child, or -1";
+                return invalid("bone_parents", parents[bone].into(), must);
+            }
         };
         let segments = segments.iter().map(|ends| ends.map(DVec3::from)).collect();
         Ok(Self { parents: parents.to_vec(), segments, order })
@@ -50,22 +52,6 @@ impl Skeleton {
         let distance = |j: &usize| self.segments[*j][0].distance_squared(tail);
         children.min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
-}
-
-fn parents_first(parents: &[i32]) -> Option<Vec<usize>> {
-    let depth = |mut bone: usize| {
-        for depth in 0..=parents.len() {
-            match usize::try_from(parents[bone]) {
-                Ok(parent) => bone = parent,
-                Err(_) => return Some(depth),
-            }
-        }
-        None
-    };
-    let depths: Vec<usize> = (0..parents.len()).map(depth).collect::<Option<_>>()?;
-    let mut order: Vec<usize> = (0..parents.len()).collect();
-    order.sort_by_key(|&bone| (depths[bone], bone));
-    Some(order)
 }
 
 /// How one joint turns, at rest space of its bone's head.

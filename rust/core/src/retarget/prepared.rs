@@ -9,9 +9,10 @@ use super::shares::Shares;
 use super::skeleton::{Guide, RestBone, guides, pairs};
 use super::warp::Warp;
 use super::{Character, Correspondence, Landmark, Report, Settings};
-use crate::adjacency::Islands;
+use crate::adjacency::{Islands, NONE};
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
+use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::registration::Match;
 use crate::weights::Weights;
@@ -101,23 +102,28 @@ impl<'a> Prepared<'a> {
     ) -> Result<(usize, usize)> {
         let [source, target] = self.characters;
         let landmarks = self.landmarks(placed);
-        let spectra = [source, target].map(|c| BiharmonicEmbedding::new(&c.mesh, self.settings.n_pairs, progress));
-        let [source_spectrum, target_spectrum] = spectra;
-        let (source_spectrum, target_spectrum) = (source_spectrum?, target_spectrum?);
-        let islands = [source, target].map(|c| Islands::new(c.mesh.triangles(), c.mesh.vertex_count()));
+        let (source_spectrum, mut source_islands) = self.spectrum(&source.mesh, &self.source, progress)?;
+        // One vertex of each place is a candidate, or its copies would crowd out the next ones.
+        let first = self.source.spread(&self.source.first);
+        std::iter::zip(0.., &first)
+            .filter(|(i, first)| i != *first)
+            .for_each(|(i, _)| source_islands[i as usize] = NONE);
+        let one = |l: &Landmark| Landmark { source: first[l.source as usize], ..*l };
+        let landmarks: Vec<Landmark> = landmarks.iter().map(one).collect();
+        let (target_spectrum, target_islands) = self.spectrum(&target.mesh, &self.target, progress)?;
         let source_normals = self.source.spread(&placed.source_normals);
         let target_normals = self.target.spread(&placed.normals);
         let regions = [(&self.source, 0), (&self.target, 1)].map(|(welded, side)| self.regions(welded, side));
         let blends = blends(
             &Described {
                 embedding: &source_spectrum,
-                islands: islands[0].of_vertex(),
+                islands: &source_islands,
                 normals: &source_normals,
                 regions: &regions[0],
             },
             &Described {
                 embedding: &target_spectrum,
-                islands: islands[1].of_vertex(),
+                islands: &target_islands,
                 normals: &target_normals,
                 regions: &regions[1],
             },
@@ -135,6 +141,21 @@ impl<'a> Prepared<'a> {
             }
         }
         Ok((landmarks.len(), count))
+    }
+
+    /// Biharmonic coordinates and island of every vertex (V) of a mesh whose coincident vertices are one.
+    fn spectrum(
+        &self,
+        mesh: &TriMesh<'_>,
+        welded: &Welded,
+        progress: &Progress,
+    ) -> Result<(BiharmonicEmbedding, Vec<u32>)> {
+        let first: Vec<u32> = welded.spread(&welded.first);
+        let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|i| first[i as usize])).collect();
+        let whole = TriMesh::new(mesh.positions(), &triangles, "welded")?;
+        let islands = Islands::new(&triangles, first.len());
+        let of_vertex = first.iter().map(|&i| islands.of_vertex()[i as usize]).collect();
+        Ok((BiharmonicEmbedding::new(&whole, self.settings.n_pairs, progress)?.at(&first), of_vertex))
     }
 
     /// Moves the match of a distinct position of the target to a blend of source vertices. How far the skeleton would have

@@ -22,7 +22,7 @@ const REACH: f64 = 8.0;
 /// No such length counts for more than this share of the source's size: what is trusted over more has little say.
 const LONGEST: f64 = 0.1;
 /// Most vertices that are solved near a stroke.
-const MOST: usize = 20_000;
+const MOST: usize = 15_000;
 /// Rows whose weights change by less stay as they are: to write them would take longer than to see a difference.
 const NOTICEABLE: f32 = 1e-4;
 /// Fewer unknowns than this are solved as fast as a whole.
@@ -106,7 +106,7 @@ fn solve_from(
     let mut stages = Stages::start();
     let problem = Problem::new(prepared, mask, settings)?;
     let changed = base.changed(&problem, mask);
-    if changed.len() > MOST / 4 || lacks_rows(prepared, &problem, mask) {
+    if changed.len() > MOST / 3 || lacks_rows(prepared, &problem, mask) {
         return Ok(None);
     }
     let region = Region::around(&prepared.target.fill, &problem, &changed, LONGEST * prepared.source.size());

@@ -5,6 +5,7 @@
 use rayon::prelude::*;
 
 use crate::fronts::blocks::BLOCK;
+use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::Tree;
 use crate::substitute::forward::{Active, Given, MOST_COLUMNS};
 use crate::substitute::solution::RightHandSides;
@@ -16,7 +17,7 @@ pub struct SparseRows<'f> {
     pub(crate) tree: Option<&'f Tree>,
     pub(crate) fronts: Vec<Place>,
     /// Where the values are: a list for every front would keep the allocator busier than the processor.
-    pub(crate) chunks: Vec<Vec<f64>>,
+    pub(crate) chunks: Vec<Buffer>,
 }
 
 /// Where the rows of one front are.
@@ -80,25 +81,26 @@ pub(crate) fn noticeable<'a>(active: Active, rows: impl Iterator<Item = (&'a [f6
 /// Rows of neighbouring fronts under construction.
 #[derive(Debug, Default)]
 pub(crate) struct Builder {
-    chunks: Vec<Vec<f64>>,
+    chunks: Vec<Buffer>,
+    /// How much of the last chunk is used.
+    used: usize,
 }
 
-impl Builder {
-    /// With room for so many values before it has to move them.
-    pub(crate) fn with_capacity(values: usize) -> Self {
-        Self { chunks: vec![Vec::with_capacity(values)] }
-    }
+/// Numbers of a chunk. The allocator asks the system for pages of its own from twice as many on: fresh ones, while smaller
+/// pieces are in memory that has been used before.
+const CHUNK: usize = 1 << 13;
 
+impl Builder {
     /// Room for the rows of a front, all zero.
     fn add(&mut self, mask: u64, count: usize) -> (Place, &mut [f64]) {
-        if self.chunks.is_empty() {
-            self.chunks.push(Vec::new());
+        let len = count * Active::of(mask).width;
+        if self.chunks.last().is_none_or(|chunk| chunk.len() < self.used + len) {
+            self.chunks.push(Buffer::zeroed(len.max(CHUNK)));
+            self.used = 0;
         }
-        let (chunk, len) = (self.chunks.len() - 1, count * Active::of(mask).width);
-        let values = &mut self.chunks[chunk];
-        let start = values.len();
-        values.resize(start + len, 0.0);
-        (Place { mask, chunk: chunk as u32, start, len }, &mut values[start..])
+        let (chunk, start) = (self.chunks.len() - 1, self.used);
+        self.used += len;
+        (Place { mask, chunk: chunk as u32, start, len }, &mut self.chunks[chunk][start..start + len])
     }
 
     /// Adds the columns of `mask` of a front's rows.
@@ -115,16 +117,18 @@ impl Builder {
         place
     }
 
-    /// Gives back the room that was not needed.
-    pub(crate) fn into_chunks(mut self) -> Vec<Vec<f64>> {
-        self.chunks.iter_mut().for_each(Vec::shrink_to_fit);
+    /// What was built.
+    pub(crate) fn into_chunks(self) -> Vec<Buffer> {
         self.chunks
     }
 
     /// Takes over what another one has made of the fronts at `places`.
     pub(crate) fn append(&mut self, other: Self, places: &mut [Place]) {
         places.iter_mut().for_each(|place| place.chunk += self.chunks.len() as u32);
-        self.chunks.extend(other.into_chunks());
+        if !other.chunks.is_empty() {
+            self.chunks.extend(other.chunks);
+            self.used = other.used;
+        }
     }
 }
 
@@ -135,10 +139,8 @@ pub(crate) struct Layout<'f> {
     pub(crate) unknowns: usize,
 }
 
-/// Fronts whose rows a worker collects at a time.
-const FRONTS_A_RUN: usize = 256;
-/// Likely number of their values.
-const LIKELY_VALUES: usize = 16 * 16 * FRONTS_A_RUN;
+/// Runs of fronts whose rows a worker collects at a time.
+const RUNS: usize = 16;
 
 impl<'f> Layout<'f> {
     fn front_count(&self) -> usize {
@@ -177,20 +179,21 @@ impl<'f> Layout<'f> {
             }
             place
         };
+        let fronts_a_run = self.front_count().div_ceil(RUNS).max(1);
         let run = |first: usize| {
-            let (mut builder, mut lists) = (Builder::with_capacity(LIKELY_VALUES), Default::default());
-            let fronts = first..self.front_count().min(first + FRONTS_A_RUN);
+            let (mut builder, mut lists) = (Builder::default(), Default::default());
+            let fronts = first..self.front_count().min(first + fronts_a_run);
             let places: Vec<Place> = fronts.map(|front| rows(&mut builder, &mut lists, front)).collect();
             (builder, places)
         };
-        let runs = (0..self.front_count().div_ceil(FRONTS_A_RUN)).into_par_iter().map(|k| run(k * FRONTS_A_RUN));
+        let runs = (0..self.front_count().div_ceil(fronts_a_run)).into_par_iter().map(|k| run(k * fronts_a_run));
         let runs: Vec<_> = runs.collect();
         let (mut all, mut fronts) = (Builder::default(), Vec::with_capacity(self.front_count()));
         for (builder, mut places) in runs {
             all.append(builder, &mut places);
             fronts.extend(places);
         }
-        SparseRows { tree: self.tree, fronts, chunks: all.chunks }
+        SparseRows { tree: self.tree, fronts, chunks: all.into_chunks() }
     }
 
     /// The sum of `terms`, each with a factor for every unknown.
@@ -213,7 +216,7 @@ impl<'f> Layout<'f> {
         }
         let (rows, mut builder) = (FrontRows { mask, values: &values }, Builder::default());
         let place = builder.add_columns(rows, self.unknowns, rows.noticeable(least));
-        SparseRows { tree: None, fronts: vec![place], chunks: builder.chunks }
+        SparseRows { tree: None, fronts: vec![place], chunks: builder.into_chunks() }
     }
 }
 
@@ -264,15 +267,10 @@ impl SparseRows<'_> {
 
     /// The smallest of the values whose magnitude is `least` or more.
     pub fn minimum(&self, least: f64) -> f64 {
-        let of_chunk = |values: &Vec<f64>| {
-            values.iter().fold(
-                f64::INFINITY,
-                |so_far: f64, &value| {
-                    if value.abs() >= least { so_far.min(value) } else { so_far }
-                },
-            )
-        };
-        self.chunks.par_iter().map(of_chunk).reduce(|| f64::INFINITY, f64::min)
+        let smaller = |so_far: f64, &value: &f64| if value.abs() >= least { so_far.min(value) } else { so_far };
+        let of_front = |front: usize| self.front(front).values.iter().fold(f64::INFINITY, smaller);
+        let fronts = (0..self.fronts.len()).into_par_iter().with_min_len(64);
+        fronts.map(of_front).reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Columns and values of one unknown, by column, without those that are not stored.

@@ -10,12 +10,13 @@ use pulp::Arch;
 use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::Tree;
+use crate::fronts::walk::BRANCHES;
 use crate::substitute::backward::Arithmetic;
 use crate::substitute::forward::{Active, Stacks, activity, forward};
 use crate::substitute::rows::{Builder, FrontRows, Place, SparseRows, Sum, noticeable};
 
-/// Subtrees with more columns than this are divided between threads.
-const FORK_COLUMNS: usize = 2000;
+/// Subtrees with more columns than this are divided between threads, unless there are [`BRANCHES`] larger ones for each.
+const FORK_COLUMNS: usize = 1000;
 
 /// Memory for one solve after the other.
 #[derive(Debug, Default)]
@@ -50,8 +51,9 @@ pub(crate) fn solve<'f>(
     }
     let mut fronts = vec![Place::default(); tree.fronts.len()];
     let (root, halfway) = (tree.root(), &halfway[..]);
-    let pass = Backward { tree, panels, panel_starts, arch, active, starts, halfway, least, subtree_least, stop };
-    let mut found = Found::with_capacity(start);
+    let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
+    let pass = Backward { tree, panels, panel_starts, arch, active, starts, halfway, least, subtree_least, fork, stop };
+    let mut found = Found::default();
     pass.descend(root, pass.active[root], Vec::new(), &mut fronts, 0, &mut found);
     SparseRows { tree: Some(tree), fronts, chunks: found.rows.into_chunks() }
 }
@@ -64,11 +66,6 @@ struct Found {
 }
 
 impl Found {
-    /// With room for so many values.
-    fn with_capacity(values: usize) -> Self {
-        Self { rows: Builder::with_capacity(values), free: Vec::new() }
-    }
-
     /// Memory for so many zeros.
     fn zeroed(&mut self, len: usize) -> Vec<f64> {
         let mut memory = self.free.pop().unwrap_or_default();
@@ -93,6 +90,8 @@ struct Backward<'a> {
     least: &'a [f64],
     /// The smallest of them in each front's subtree.
     subtree_least: Vec<f64>,
+    /// Columns of a subtree from which on it is divided between threads.
+    fork: usize,
     stop: &'a AtomicBool,
 }
 
@@ -153,8 +152,8 @@ impl Backward<'_> {
                 let (before, after) = fronts.split_at_mut(cut - first);
                 let columns =
                     |roots: &[usize]| roots.iter().map(|&root| self.tree.fronts[root].subtree_columns).sum::<usize>();
-                if columns(left).min(columns(right)) > FORK_COLUMNS {
-                    let mut other = Found::with_capacity(parent.active.width * columns(right));
+                if columns(left).min(columns(right)) > self.fork {
+                    let mut other = Found::default();
                     rayon::join(
                         || self.children(left, parent, before, first, found),
                         || self.children(right, parent, after, cut, &mut other),
