@@ -23,6 +23,10 @@ const MOST_REPEATS: f32 = 4.0;
 /// In contact is what has come this near to the plane, in radii: the lattice holds skin off the plane, and folds start
 /// before it is there.
 const TOUCH: f32 = 0.2;
+/// A joint that bends by less than this (radians) has nothing in contact that does not touch, and no step shows where a
+/// membrane ends; from the other one on it is as wide as it gets.
+const SLIGHT: f32 = 0.17;
+const BENT: f32 = 0.79;
 
 /// One bent joint in one step.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +34,8 @@ pub(super) struct Crease<'a> {
     pub(super) axis: Axis,
     pub(super) plane: HalfSpace,
     pub(super) radius: f32,
+    /// Where the joint bends to at last, radians.
+    pub(super) swing: f32,
     /// Free particles of the joint, local.
     pub(super) members: &'a [Member],
 }
@@ -65,7 +71,8 @@ impl Crease<'_> {
 
     /// The skin in contact and what lies near it, if any is.
     pub(super) fn membrane(&self, local: &Local) -> Option<Membrane> {
-        let contacts = self.contacts(local, TOUCH * self.radius);
+        let bend = ((self.swing - SLIGHT) / (BENT - SLIGHT)).clamp(0.0, 1.0);
+        let contacts = self.contacts(local, TOUCH * bend * self.radius);
         if contacts.is_empty() {
             return None;
         }

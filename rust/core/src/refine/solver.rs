@@ -262,7 +262,8 @@ impl Frame<'_> {
     }
 
     fn crease(&self, k: usize, axis: &Axis, plane: HalfSpace) -> Crease<'_> {
-        Crease { axis: *axis, plane, radius: self.active[k].joint.radius, members: &self.local.region.free[k] }
+        let ActiveJoint { joint, swing, .. } = self.active[k];
+        Crease { axis: *axis, plane, radius: joint.radius, swing, members: &self.local.region.free[k] }
     }
 
     /// Skin in contact when a joint has come all the way.
