@@ -114,7 +114,7 @@ fn slabs_and_cleared_triangles_change_no_pair() {
     let plain = intersecting_pairs_of(&places, &triangles, &all, &|_| false, &Slabs::new([]));
     assert!(plain.len() > 100);
     assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &|_| false, &slanting), plain);
-    let cleared = |t: u32| t % 3 != 0;
+    let cleared = |t: u32| !t.is_multiple_of(3);
     let fresh: Vec<_> = plain.iter().copied().filter(|pair| !pair.iter().all(|&t| cleared(t))).collect();
     assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &cleared, &slanting), fresh);
     assert!(fresh.len() < plain.len());
