@@ -57,8 +57,8 @@ def read(meshes: Sequence[bpy.types.Object], *rigs: bpy.types.Object) -> Whole:
         flipped.append(part.flipped[is_copy][order])
     positions = [part.geometry.positions[: part.n_own] for part in parts]
     positions += [part.geometry.positions[part.n_own :] for part in parts]
-    joined = (np.concatenate(each) for each in (positions, triangles))
-    return Whole(*joined, starts, np.concatenate(origin), np.concatenate(flipped))
+    joined = [np.concatenate(each) for each in (positions, triangles, origin, flipped)]
+    return Whole(joined[0], joined[1], starts, joined[2], joined[3])
 
 
 def _completed(obj: bpy.types.Object, shape: shapes.Shape) -> completion.Completion:

@@ -53,8 +53,8 @@ def triangulated(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> tuple[
     if not quad.size:
         return blenders_triangles(mesh), no_quads()
     is_all = len(quad) == len(start)
-    around = corners.reshape(-1, 4) if is_all else corners[start[quad].astype(np.int64)[:, None] + _FOUR]
-    around = around.astype(np.uint32)
+    of_quads = corners if is_all else corners[start[quad].astype(np.int64)[:, None] + _FOUR]
+    around: NDArray[np.uint32] = of_quads.reshape(-1, 4).astype(np.uint32)
     other, convex = _cuts(positions, around)
     first = start[quad].astype(np.int64) - 2 * quad  # n corners make n - 2 triangles
     quads = Quads(around[convex], first[convex])
