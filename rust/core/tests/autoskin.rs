@@ -194,7 +194,7 @@ fn refuses_what_cannot_be_meant() {
     assert!(
         refused(&|segments, _| segments[1][0][1] = f32::NAN).contains("bone 1 has a head or tail that is not finite")
     );
-    assert!(refused(&|_, parents| parents[1] = 7).contains("bone 1 has the parent 7"));
+    assert!(refused(&|_, parents| parents[1] = 7).contains("parents of bone 1 lead"));
     assert!(refused(&|segments, _| segments.iter_mut().flatten().for_each(|p| p[0] += 99.0)).contains("outside"));
     let settings = Settings { stiffness: f64::NAN, ..Settings::default() };
     assert!(matches!(run(&mesh, &chain(), &settings), Err(Error::InvalidParameter { name: "stiffness", .. })));

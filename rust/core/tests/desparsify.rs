@@ -205,9 +205,9 @@ fn what_cannot_be_used_is_refused_with_the_reason() {
     let short = Skeleton { parents: &[-1], ..good };
     assert_eq!(refuse(Method::Hop, 4, &short, None), "bone_parents has 1 entries where 4 are needed");
     let cyclic = Skeleton { parents: &[1, 2, 0, 0], ..good };
-    assert!(refuse(Method::Hop, 4, &cyclic, None).contains("ancestor"));
+    assert!(refuse(Method::Hop, 4, &cyclic, None).contains("not below its child"));
     let outside = Skeleton { parents: &[-1, 0, 0, 9], ..good };
-    assert!(refuse(Method::Hop, 4, &outside, None).contains("one of the bones"));
+    assert!(refuse(Method::Hop, 4, &outside, None).contains("must be another bone"));
     assert!(refuse(Method::Surface, 4, &good, None).contains("positions"));
     let (other_positions, other_triangles) = strip(9);
     let other = TriMesh::new(&other_positions, &other_triangles, "rest").unwrap();
