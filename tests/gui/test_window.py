@@ -41,7 +41,7 @@ def test_no_session_is_lost_and_none_is_left_behind(blender):
 
 
 def test_what_happens_around_sessions_harms_nothing(blender):
-    assert len(blender.run("sideways", timeout=900, size=(700, 520))["passed"]) == 21
+    assert len(blender.run("sideways", timeout=900, size=(700, 520))["passed"]) == 22
 
 
 def test_a_released_brush_never_leaves_its_rest_shape_in_the_view(blender):

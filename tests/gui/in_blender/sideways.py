@@ -197,6 +197,25 @@ def painting_and_another_scene(window: Window) -> Steps:
         bpy.data.scenes.remove(scene)
 
 
+def undo_right_after_painting_began(window: Window) -> Steps:
+    yield from a_dress(window)
+    yield from begin_painting(window)
+    window.key("RET")
+    yield from until(nothing_is_left)
+    obj = bpy.data.objects["Dress"]
+    obj.vertex_groups.active = obj.vertex_groups[obj.skinwright.mask_group]
+    operator(window, "ed.undo_push", message="Mask is active")
+    bare = state("Dress")
+    bpy.context.scene.skinwright.transfer.softness = 3
+    bpy.context.scene.skinwright.transfer.relative_max_distance = 0.01
+    yield from begin_painting(window)
+    assert state("Dress") != bare, "nothing was solved"
+    window.key("Z", ctrl=True)
+    window.event("MOUSEMOVE")
+    yield from until(nothing_is_left)
+    assert state("Dress") == bare
+
+
 def a_dress(window: Window) -> Steps:
     _, figure, _ = dress.build(900)
     bpy.context.scene.skinwright.transfer.source = figure
@@ -638,6 +657,7 @@ SCENARIOS = (
     a_mesh_of_two_objects,
     the_scene_is_left,
     painting_and_another_scene,
+    undo_right_after_painting_began,
     hidden_objects,
     local_view,
     tab_into_edit_mode,

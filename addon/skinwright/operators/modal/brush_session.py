@@ -49,6 +49,7 @@ class BrushSession:
         obj = self.target()
         if obj:
             setattr(obj.skinwright, self.flag, value)
+            _mark_mesh(obj, value)
 
     def enter(self, context: Context) -> None:
         """Write what the session begins with, and go to the mode of its brushes."""
@@ -108,6 +109,9 @@ current: BrushSession | None = None
 ended: BrushSession | None = None
 
 FLAGS = ("sculpting", "painting")
+# A property of the mesh within a session. Blender's undo leaves a mesh as it is in memory, with all that has been
+# written since, if its two steps hold the same of it.
+_OF_MESH = "skinwright_session"
 # The objects of all sessions in this file, by Blender's number. A copy made during one, and what comes from another
 # file, may bear a mark as well, which means nothing.
 _begun: set[int] = set()
@@ -160,3 +164,11 @@ def unmark(objects: list[Object]) -> None:
         for flag in FLAGS:
             if getattr(obj.skinwright, flag):
                 setattr(obj.skinwright, flag, False)
+        _mark_mesh(obj, False)
+
+
+def _mark_mesh(obj: Object, value: bool) -> None:
+    if value:
+        obj.data[_OF_MESH] = True
+    elif obj.data and _OF_MESH in obj.data:
+        del obj.data[_OF_MESH]
