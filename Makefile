@@ -46,7 +46,8 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name '*
 IN_TIME := timeout --kill-after=10
 PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest --hypothesis-seed=1
 # bpy 4.2 crashes at random after some hundred operators in one process, so there each file of such tests has its own.
-IN_PROCESSES = $(call PYTEST,$(1)) --ignore=tests/operators --ignore=tests/stored && \
+# The native module alone is tested with the same Python beside 4.5.
+IN_PROCESSES = $(call PYTEST,$(1)) --ignore=tests/operators --ignore=tests/stored $(if $(FULL),,--ignore=tests/native) && \
 	for file in tests/operators/test_*.py tests/stored/test_*.py; do $(call PYTEST,$(1)) -q $$file || [ $$? = 5 ] || exit 1; done
 SUITE_.venv-4.2 = $(call IN_PROCESSES,.venv-4.2)
 # CI has half an hour. The long-term versions take all tests, the newest those that touch Blender's data the most;
