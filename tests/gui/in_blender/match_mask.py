@@ -46,12 +46,12 @@ def steps(window: Window) -> Steps:
     assert weights() == bare
     session = import_module(f"{EXTENSION}.match.session").current
     few = session.last_match.counts().tolist()
-    bpy.context.scene.skinwright.transfer.relative_max_distance = 0.12
+    bpy.context.scene.skinwright.transfer.softness = 0.25
     yield from window.screenshot("preview_slider")
     many = session.last_match.counts().tolist()
     assert many[0] > few[0], "the overlay did not follow the slider"
     record["few"], record["many"] = few, many
-    bpy.context.scene.skinwright.transfer.relative_max_distance = 0.05
+    bpy.context.scene.skinwright.transfer.softness = 1.0
 
     with window.context():
         bpy.ops.skinwright.paint_match_mask("INVOKE_DEFAULT")
