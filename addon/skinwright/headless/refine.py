@@ -94,7 +94,7 @@ def _cache(options: argparse.Namespace, obj: bpy.types.Object, params: Correctiv
     first, last = options.frames or (scene.frame_start, scene.frame_end)
     kind: CacheFormat = "mdd" if options.cache.suffix.lower() == ".mdd" else "pc2"
     path = options.cache.resolve()
-    mesh_cache.is_own(obj, path)
+    mesh_cache.check_file(obj, path)
     return jobs.wait(cache.steps(obj, params, path, (first, last), kind, overwrite=options.overwrite))
 
 

@@ -97,11 +97,11 @@ def steps(
     """
     driven_keys.check(obj)
     character = characters.read(obj)
-    seen = Watched([obj, characters.rig_of(obj)])
+    rig = characters.rig_of(obj)
+    seen = Watched([obj, rig])
     bones = joints(character, chosen or set())
     if not bones:
         raise SceneError(f"{obj.name} follows none of the chosen joints: choose bones with a parent and with weights")
-    rig = characters.rig_of(obj)
     poses = samples(bones, params, [armature.rotation_limits(rig, character.bones[bone]) for bone in bones])
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]
     solved = yield Solving([partial(_solve, character, refiner, sample, params) for sample in poses])

@@ -69,12 +69,7 @@ def triangulated(mesh: bpy.types.Mesh, positions: NDArray[np.float32]) -> tuple[
 
 def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32] | None:
     """(L,) the vertices around each face, one face after the other; None in Edit mode, where they are not kept."""
-    attribute = mesh.attributes.get(".corner_vert")
-    if attribute is None:
-        return None
-    corners = np.empty(len(mesh.loops), np.int32)
-    attribute.data.foreach_get("value", corners)
-    return corners
+    return _attribute(mesh, ".corner_vert", len(mesh.loops))
 
 
 def stored(
@@ -84,12 +79,20 @@ def stored(
 
     The attribute is missing in Edit mode.
     """
-    values = np.empty(len(elements) * size, np.int32)
+    values = _attribute(mesh, name, len(elements) * size)
+    if values is None:
+        values = np.empty(len(elements) * size, np.int32)
+        elements.foreach_get(property_name, values)
+    return values
+
+
+def _attribute(mesh: bpy.types.Mesh, name: str, count: int) -> NDArray[np.int32] | None:
+    """(count,) the integers of an attribute, if there is one."""
     attribute = mesh.attributes.get(name)
     if attribute is None:
-        elements.foreach_get(property_name, values)
-    else:
-        attribute.data.foreach_get("value", values)
+        return None
+    values = np.empty(count, np.int32)
+    attribute.data.foreach_get("value", values)
     return values
 
 

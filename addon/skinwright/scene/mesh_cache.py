@@ -25,11 +25,15 @@ def check(obj: bpy.types.Object) -> None:
         )
 
 
-def is_own(obj: bpy.types.Object, path: Path) -> bool:
-    """Whether baking may replace this file, as it was baked for `obj`. Raises SceneError if another object plays it."""
+def check_file(obj: bpy.types.Object, path: Path) -> None:
+    """Raise SceneError for a file that another object plays."""
     for other in bpy.data.objects:
         if other != obj and any(m.type == "MESH_CACHE" and _is(m.filepath, path) for m in other.modifiers):
             raise SceneError(f"{path} is played by {other.name}: give the cache of {obj.name} another name")
+
+
+def is_own(obj: bpy.types.Object, path: Path) -> bool:
+    """Whether this file was baked for `obj`, so that baking again may replace it."""
     return _is(obj.get(_BAKED, ""), path)
 
 

@@ -65,8 +65,8 @@ class SKINWRIGHT_OT_bake_refined_cache(LongWork, RefineSettings, SkinwrightOpera
         obj, kind = found(context), self.kind.lower()
         params = self.to_params(preferences.threads(context))
         path = self._path(obj.name, kind)
-        own = mesh_cache.is_own(obj, path)
-        files.check_output(path, others=blend_file.opened(), overwrite=own or self.overwrite)
+        mesh_cache.check_file(obj, path)
+        files.check_output(path, others=blend_file.opened(), overwrite=self.overwrite or mesh_cache.is_own(obj, path))
         return cache.steps(obj, params, path, (self.frame_start, self.frame_end), kind)
 
     def _path(self, name: str, kind: str) -> Path:

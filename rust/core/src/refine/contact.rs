@@ -33,11 +33,18 @@ pub(super) struct Contact {
     at_rest: HashSet<[u32; 2]>,
 }
 
-/// Triangles among which folds are looked for.
+/// Triangles among which folds are looked for, and which of them are known to be clear of each other.
 #[derive(Clone, Copy)]
 pub(super) struct Suspects<'a> {
     pub(super) triangles: &'a [u32],
     pub(super) cleared: &'a Cleared<'a>,
+}
+
+impl<'a> Suspects<'a> {
+    /// Of these triangles nothing is known.
+    fn all_of(triangles: &'a [u32]) -> Self {
+        Self { triangles, cleared: &|_| false }
+    }
 }
 
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
@@ -103,33 +110,19 @@ impl Contact {
     /// The pairs of all of the skin's triangles that do not intersect at rest.
     pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
         let all: Vec<u32> = (0..skin.triangles().len() as u32).collect();
-        self.pairs(skin, places, &all, &|_| false, slabs)
+        self.pairs(skin, places, Suspects::all_of(&all), slabs)
     }
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
     /// which is the outer one cannot be told: pushing and smoothing would eat them up.
-    fn own_pairs(
-        &self,
-        skin: &dyn Skin,
-        places: &[Vec3],
-        among: &[u32],
-        cleared: &Cleared<'_>,
-        slabs: &Slabs,
-    ) -> Vec<[u32; 2]> {
-        let mut pairs = self.pairs(skin, places, among, cleared, slabs);
+    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: Suspects<'_>, slabs: &Slabs) -> Vec<[u32; 2]> {
+        let mut pairs = self.pairs(skin, places, among, slabs);
         pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
         pairs
     }
 
-    fn pairs(
-        &self,
-        skin: &dyn Skin,
-        places: &[Vec3],
-        among: &[u32],
-        cleared: &Cleared<'_>,
-        slabs: &Slabs,
-    ) -> Vec<[u32; 2]> {
-        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among, cleared, slabs);
+    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: Suspects<'_>, slabs: &Slabs) -> Vec<[u32; 2]> {
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among.triangles, among.cleared, slabs);
         pairs.retain(|&[a, b]| {
             let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
@@ -146,11 +139,11 @@ impl Contact {
         &self,
         skin: &dyn Skin,
         places: &mut Vec<Vec3>,
-        Suspects { triangles: suspects, cleared }: Suspects<'_>,
+        suspects: Suspects<'_>,
         farthest: f32,
         slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
-        let (mut pairs, mut moved) = (self.own_pairs(skin, places, suspects, cleared, slabs), Vec::new());
+        let (mut pairs, mut moved) = (self.own_pairs(skin, places, suspects, slabs), Vec::new());
         for _ in 0..CHECKS {
             if pairs.is_empty() {
                 break;
@@ -164,7 +157,7 @@ impl Contact {
             }
             // Pushing looks around the pairs alone, and may have pressed them into what lies on the other side.
             let still = |t: u32| !skin.triangles()[t as usize].iter().any(|i| has_moved.contains(i));
-            pairs = self.own_pairs(skin, places, suspects, &still, slabs);
+            pairs = self.own_pairs(skin, places, Suspects { cleared: &still, ..suspects }, slabs);
         }
         moved.sort_unstable();
         moved.dedup();
@@ -196,7 +189,7 @@ impl Contact {
                     now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
                 }
                 moved.extend(pushed);
-                left = self.own_pairs(skin, &now, &among, &|_| false, slabs);
+                left = self.own_pairs(skin, &now, Suspects::all_of(&among), slabs);
                 stalled += 1;
                 if left.len() < pairs.len() {
                     stalled = 0;

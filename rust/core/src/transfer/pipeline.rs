@@ -9,7 +9,7 @@ use super::{
 };
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
-use crate::fill::{Constraint, Filled, Row, Screen};
+use crate::fill::{Constraint, Fill, Filled, Row, Screen};
 use crate::limit::limit;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
@@ -48,6 +48,12 @@ impl Problem {
             MatchMethod::Confidence => 0.0,
         };
         Ok(Self { criteria, smoothness_length, constraints, has_match })
+    }
+
+    /// Whether vertex `i` is on an island where anything is known.
+    pub fn is_reached(&self, fill: &Fill, i: usize) -> bool {
+        let island = fill.islands().of_vertex()[i];
+        self.has_match.get(island as usize).is_some_and(|&has_match| has_match)
     }
 }
 
@@ -191,6 +197,19 @@ fn inpaint_masked(
         _ => Constraint::Free,
     };
     let constraints = std::iter::zip(&problem.constraints, mask).map(constraint).collect();
+    inpaint(prepared, constraints, &weights, settings, progress, gather)
+}
+
+/// Fills in the free vertices by the paper's energy, between the rows that `weights` has for the others, and hands all rows to
+/// `take`.
+pub(super) fn inpaint<T>(
+    prepared: &mut Inpainting,
+    constraints: Vec<Constraint>,
+    weights: &Weights,
+    settings: &Settings,
+    progress: &Progress,
+    take: impl FnOnce(&Inpainting, &Filled<'_>) -> T,
+) -> Result<T> {
     let length = settings.smoothness_length.of(prepared.source.diagonal());
     let fill = &mut prepared.target.fill;
     let assembled = fill.assemble(constraints, length, progress)?;
@@ -199,7 +218,8 @@ fn inpaint_masked(
         let (bones, values) = weights.row(i as usize);
         row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value))));
     };
-    Ok(gather(prepared, &prepared.target.fill.solve(&given, progress)?))
+    let filled = prepared.target.fill.solve(&given, progress)?;
+    Ok(take(prepared, &filled))
 }
 
 fn stiffened(prepared: &Inpainting, weights: Weights, settings: &Settings) -> (Weights, usize) {

@@ -1,12 +1,13 @@
 //! The neighbourhood of a stroke of the mask, solved again by itself, so that an artist sees at once what it does.
 //!
 //! What a stroke changes dies away within a few of the lengths that rows are trusted over. The last solve of the whole mesh is
-//! kept; after a stroke the vertices within [`REACH`] such lengths of the change are solved, at most [`MOST`] of them, held
+//! kept; after a stroke the vertices within a few such lengths of the change are solved, at most [`MOST`] of them, held
 //! around at what was found before ([`Patch`]). Rows farther away stay. The exact answer is another solve of the whole, which
 //! does not depend on what came before; the caller asks for it once the artist has seen this one.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+mod region;
+
+use region::{MOST, Region};
 
 use super::pipeline::{self, Problem, Solved, trusted};
 use super::report::Stages;
@@ -17,12 +18,6 @@ use crate::fill::{Constraint, Fill, Found, Patch, Row, Screen};
 use crate::progress::Progress;
 use crate::weights::Weights;
 
-/// How far a change is followed, in lengths over which it falls to a third.
-const REACH: f64 = 8.0;
-/// No such length counts for more than this share of the source's size: what is trusted over more has little say.
-const LONGEST: f64 = 0.1;
-/// Most vertices that are solved near a stroke.
-const MOST: usize = 15_000;
 /// Rows whose weights change by less stay as they are: to write them would take longer than to see a difference.
 const NOTICEABLE: f32 = 1e-4;
 /// Fewer unknowns than this are solved as fast as a whole.
@@ -109,7 +104,7 @@ fn solve_from(
     if changed.len() > MOST / 3 || lacks_rows(prepared, &problem, mask) {
         return Ok(None);
     }
-    let region = Region::around(&prepared.target.fill, &problem, &changed, LONGEST * prepared.source.size());
+    let region = Region::around(&prepared.target.fill, &problem, &changed, prepared.source.size());
     stages.end("assemble");
     let (weights, report) = screened(prepared, base, &problem, mask, &region, progress)?;
     let confidence = prepared.matches.confidence(&problem.constraints, settings.softness, mask);
@@ -126,60 +121,7 @@ fn solve_from(
 /// its first stroke.
 fn lacks_rows(prepared: &Inpainting, problem: &Problem, mask: Option<&[MaskValue]>) -> bool {
     let unknown = |i: usize| problem.constraints[i] == Constraint::Free && of_mask(mask, i) != MaskValue::Inpaint;
-    let islands = prepared.target.fill.islands().of_vertex();
-    let on_reached = |i: usize| problem.has_match.get(islands[i] as usize).is_some_and(|&has_match| has_match);
-    (0..islands.len()).any(|i| unknown(i) && on_reached(i))
-}
-
-/// The vertices that are solved again.
-struct Region {
-    vertices: Vec<u32>,
-    /// (V)
-    contains: Vec<bool>,
-}
-
-impl Region {
-    /// The vertices near the `changed` ones, the nearest first; `longest` is the length that counts at most.
-    fn around(fill: &Fill, problem: &Problem, changed: &[u32], longest: f64) -> Self {
-        let (mesh, laplacian) = (fill.mesh(), fill.laplacian());
-        let rate = |i: usize| {
-            let confidence = if let Constraint::Soft(confidence) = problem.constraints[i] { confidence } else { 0.0 };
-            (confidence / laplacian.mass(i).max(f64::MIN_POSITIVE)).sqrt().max(1.0 / longest)
-        };
-        let mut distance = vec![f64::INFINITY; problem.constraints.len()];
-        let mut region = Self { vertices: Vec::new(), contains: vec![false; distance.len()] };
-        changed.iter().for_each(|&i| distance[i as usize] = 0.0);
-        // Distances are not negative, so their bits order as they do.
-        let mut queue: BinaryHeap<Reverse<(u64, u32)>> = changed.iter().map(|&i| Reverse((0, i))).collect();
-        while let Some(Reverse((bits, i))) = queue.pop() {
-            if std::mem::replace(&mut region.contains[i as usize], true) {
-                continue;
-            }
-            region.vertices.push(i);
-            if region.vertices.len() == MOST {
-                break;
-            }
-            for &j in laplacian.neighbours(i as usize) {
-                let length = mesh.position(i).distance(mesh.position(j));
-                let there = f64::from_bits(bits) + length * (rate(i as usize) + rate(j as usize)) / 2.0;
-                let is_open = problem.constraints[j as usize] != Constraint::Fixed;
-                if is_open && there <= REACH && there < distance[j as usize] {
-                    distance[j as usize] = there;
-                    queue.push(Reverse((there.to_bits(), j)));
-                }
-            }
-        }
-        region
-    }
-
-    /// With the neighbours of its vertices, (V).
-    fn widened(&self, fill: &Fill) -> Vec<bool> {
-        let mut wider = self.contains.clone();
-        for &i in &self.vertices {
-            fill.laplacian().neighbours(i as usize).iter().for_each(|&j| wider[j as usize] = true);
-        }
-        wider
-    }
+    (0..problem.constraints.len()).any(|i| unknown(i) && problem.is_reached(&prepared.target.fill, i))
 }
 
 /// The rows of all vertices, those of the region solved again.
@@ -266,22 +208,12 @@ fn inpainted(
     if !chosen.contains(&true) {
         return Ok(weights);
     }
-    let on_reached = |i: usize| {
-        let island = prepared.target.fill.islands().of_vertex()[i];
-        problem.has_match.get(island as usize).is_some_and(|&has_match| has_match)
-    };
-    let constraint = |i: usize| if chosen[i] || !on_reached(i) { Constraint::Free } else { Constraint::Fixed };
+    let is_open = |i: usize| chosen[i] || !problem.is_reached(&prepared.target.fill, i);
+    let constraint = |i: usize| if is_open(i) { Constraint::Free } else { Constraint::Fixed };
     let constraints = (0..chosen.len()).map(constraint).collect();
-    let length = settings.smoothness_length.of(prepared.source.diagonal());
-    let fill = &mut prepared.target.fill;
-    let assembled = fill.assemble(constraints, length, progress)?;
-    fill.factor(assembled, progress)?;
-    let given = |i: u32, row: &mut Row| {
-        let (bones, values) = weights.row(i as usize);
-        row.extend(std::iter::zip(bones, values).map(|(&bone, &value)| (bone, f64::from(value))));
-    };
-    let filled = fill.solve(&given, progress)?;
-    Ok(replaced(&weights, &chosen, |i, row| filled.append_row(i, row)))
+    pipeline::inpaint(prepared, constraints, &weights, settings, progress, |_, filled| {
+        replaced(&weights, &chosen, |i, row| filled.append_row(i, row))
+    })
 }
 
 /// Which vertices that the mask says to inpaint hang together with the region, (V): the energy couples two-rings.
