@@ -1,12 +1,15 @@
 //! The one table from the core's errors to Python exceptions, and the one door that frees the GIL.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::OnceLock;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, OnceLock};
+use std::thread::Builder;
+use std::time::Duration;
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use skinwright_core::Error;
+use skinwright_core::{Error, Progress};
 
 create_exception!(skinwright_native, SkinwrightError, PyValueError, "Base of every error of this module.");
 create_exception!(skinwright_native, NothingMatched, SkinwrightError, "No target vertex matches the source.");
@@ -83,4 +86,37 @@ pub fn enter<T: Send>(
     work: impl FnOnce() -> skinwright_core::Result<T> + Send,
 ) -> PyResult<T> {
     finish(py.detach(|| run(threads, work)))
+}
+
+/// How often work that may take long is interrupted for a look at signals.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// The door of work that may take long: Ctrl C stops it and is raised.
+pub fn enter_stoppable<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce(&Progress) -> skinwright_core::Result<T> + Send,
+) -> PyResult<T> {
+    let progress = Progress::default();
+    let (running, ended) = channel::<()>();
+    let mut interrupt = None;
+    let outcome = std::thread::scope(|scope| {
+        let watched = &progress;
+        let work = move || {
+            let _running = running; // Dropped at the end, whatever that is: nobody waits for ever.
+            run(threads, || work(watched))
+        };
+        let worker =
+            Builder::new().spawn_scoped(scope, work).map_err(|error| format!("no thread can be started: {error}"))?;
+        let ended = &Mutex::new(ended);
+        let is_running = || ended.lock().expect("never poisoned").recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout);
+        while py.detach(is_running) {
+            if let Err(signal) = py.check_signals() {
+                watched.cancel();
+                interrupt = Some(signal);
+            }
+        }
+        py.detach(|| worker.join()).unwrap_or_else(|_| Err("the work's thread was lost".into()))
+    });
+    interrupt.map_or_else(|| finish(outcome), Err)
 }

@@ -106,7 +106,7 @@ macro_rules! call_and_job {
         #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
         pub fn $call($py: Python<'_>, $($(#[$($attribute)*])* $name: $kind),+) -> PyResult<$returns> {
             let inputs = $inputs;
-            let result = crate::error::enter($py, $threads, || inputs.run(&Progress::default()))?;
+            let result = crate::error::enter_stoppable($py, $threads, |progress| inputs.run(progress))?;
             present($py, result)
         }
 
