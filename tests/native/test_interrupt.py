@@ -20,6 +20,7 @@ weights = native.Weights(np.arange(4, dtype=np.uint32), np.zeros(3, np.uint32), 
 calls = {
     "transfer": lambda: native.Source(*small, weights).transfer(positions, triangles),
     "embedding": lambda: native.biharmonic_embedding(positions, triangles, n_pairs=100),
+    "job": lambda: native.Inpainting(native.Source(*small, weights), positions, triangles).start().result(),
 }
 seen = []
 
@@ -49,7 +50,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a process cannot send itself Ctrl C there")
-@pytest.mark.parametrize("call", ["transfer", "embedding"])
+@pytest.mark.parametrize("call", ["transfer", "embedding", "job"])
 def test_ctrl_c_stops_a_call_that_takes_long(call):
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, call], capture_output=True, text=True, timeout=120, check=False

@@ -11,6 +11,8 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use skinwright_core::{Error, Progress};
 
+use crate::waiting;
+
 create_exception!(skinwright_native, SkinwrightError, PyValueError, "Base of every error of this module.");
 create_exception!(skinwright_native, NothingMatched, SkinwrightError, "No target vertex matches the source.");
 create_exception!(skinwright_native, InvalidMesh, SkinwrightError, "A mesh that cannot be used.");
@@ -88,35 +90,25 @@ pub fn enter<T: Send>(
     finish(py.detach(|| run(threads, work)))
 }
 
-/// How often work that may take long is interrupted for a look at signals.
-const LOOK: Duration = Duration::from_millis(50);
-
 /// The door of work that may take long: Ctrl C stops it and is raised.
 pub fn enter_stoppable<T: Send>(
     py: Python<'_>,
     threads: usize,
     work: impl FnOnce(&Progress) -> skinwright_core::Result<T> + Send,
 ) -> PyResult<T> {
-    let progress = Progress::default();
-    let (running, ended) = channel::<()>();
-    let mut interrupt = None;
-    let outcome = std::thread::scope(|scope| {
-        let watched = &progress;
-        let work = move || {
-            let _running = running; // Dropped at the end, whatever that is: nobody waits for ever.
-            run(threads, || work(watched))
+    let progress = &Progress::default();
+    let (running, ended) = waiting::end();
+    let work = move || {
+        let _running = running;
+        run(threads, || work(progress))
+    };
+    let (outcome, interrupt) = std::thread::scope(|scope| {
+        let worker = match Builder::new().spawn_scoped(scope, work) {
+            Ok(worker) => worker,
+            Err(error) => return (Err(format!("no thread can be started: {error}")), None),
         };
-        let worker =
-            Builder::new().spawn_scoped(scope, work).map_err(|error| format!("no thread can be started: {error}"))?;
-        let ended = &Mutex::new(ended);
-        let is_running = || ended.lock().expect("never poisoned").recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout);
-        while py.detach(is_running) {
-            if let Err(signal) = py.check_signals() {
-                watched.cancel();
-                interrupt = Some(signal);
-            }
-        }
-        py.detach(|| worker.join()).unwrap_or_else(|_| Err("the work's thread was lost".into()))
+        let interrupt = ended.watched(py, progress);
+        (py.detach(|| worker.join()).unwrap_or_else(|_| Err("the work's thread was lost".into())), interrupt)
     });
     interrupt.map_or_else(|| finish(outcome), Err)
 }
