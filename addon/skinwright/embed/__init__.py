@@ -14,7 +14,7 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names, whole
 from ..retarget.inputs import joined_rows
-from ..scene import armature, embedded, object_state, rest_bones
+from ..scene import armature, attaching, embedded, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..scene.watched import Watched
@@ -151,7 +151,7 @@ def _write(
             embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
             for obj in targets if params.bind else ():
                 if armature.find(obj) is None:
-                    armature.bind(obj, rig)
+                    attaching.bind(obj, rig)
             return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
     except BaseException:
         embedded.remove(rig)

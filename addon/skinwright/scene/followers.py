@@ -9,10 +9,8 @@ import numpy as np
 from mathutils import Matrix
 
 from .. import csr
-from . import armature, carried, modifier_inputs, modifiers, shapes, vertex_groups
+from . import armature, attaching, carried, modifiers, shapes, stack, vertex_groups
 
-# Modifiers that take the shape of other objects; all others look at their places at most.
-_FOLLOWS_A_SHAPE = {"BOOLEAN", "CURVE", "LATTICE", "MESH_DEFORM", "NODES", "SHRINKWRAP", "SURFACE_DEFORM"}
 # Nodes store weights as they are.
 _SAME_WEIGHT = 1e-4
 
@@ -39,6 +37,8 @@ def others(
         *_armatures(obj, sources),
         *_switched_off(obj, sources),
         *_surfaces(obj, sources),
+        *_caches(obj),
+        *shaping(obj, sources),
         *_overruled(obj, set(groups)),
     ]
 
@@ -158,20 +158,38 @@ def _surfaces(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Fo
     """Modifiers that carry the mesh along with what a pose moves: the source's surface, bones, what hangs on them."""
     found = []
     for modifier in modifiers.used(obj):
-        followed = [other for other in modifier_inputs.objects(modifier) if _moves(other, modifier, sources)]
+        followed = stack.follows_pose(modifier, sources)
         if followed and modifier.type != "ARMATURE" and modifiers.moves(modifier):
             phrase = f"has the modifier {modifier.name}, which follows {followed[0].name} too"
             found.append(Follower(phrase, partial(_hide, modifier)))
     return found
 
 
-def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: list[bpy.types.Object]) -> bool:
-    """Whether a pose changes what the modifier sees of the object."""
-    if other.type == "ARMATURE":
-        return modifier_inputs.names_a_bone(modifier)
-    if carried.is_carried(other, sources):
-        return True
-    return modifier.type in _FOLLOWS_A_SHAPE and carried.is_deformed(other, sources)
+def _caches(obj: bpy.types.Object) -> list[Follower]:
+    """Modifiers that put the vertices where a file says, whatever the weights say."""
+    playing = [m for m in modifiers.used(obj) if modifiers.plays_a_file(m)]
+    return [Follower(f"has the modifier {m.name}, which plays a cache", partial(_hide, m)) for m in playing]
+
+
+def shaping(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+    """Modifiers after the armature that shape its pose as they should shape the mesh at rest."""
+    return [
+        Follower(
+            f"has the modifier {modifier.name} after its armature, so that it shapes the pose and not the mesh at rest",
+            partial(_lift, obj, modifier.name),
+        )
+        for modifier in stack.shaping_the_pose(obj, sources)
+    ]
+
+
+def _lift(obj: bpy.types.Object, name: str) -> None:
+    """Put the armature below this modifier, or the modifier above the armature."""
+    first = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE" and m.object), None)
+    if first is not None and first < obj.modifiers.find(name):
+        stack.move(obj, name, first)
+    if armature.deforms_as_parent(obj) and obj.parent.type == "ARMATURE":
+        attaching.bind(obj, obj.parent)
+        obj.parent_type = "OBJECT"
 
 
 def _overruled(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:

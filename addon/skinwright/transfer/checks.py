@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import armature, editable, mesh, mirror, sides, vertex_groups
+from ..scene import armature, editable, mesh, mirror, sides, stack, vertex_groups
 from ..scene.error import SceneError
 from .inputs import Body, Garment
 from .params import TransferParams
@@ -42,7 +42,7 @@ def target_problem(
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
-    found = [sentence for sentence in (_source_mirror(body), _envelopes(body)) if sentence]
+    found = [sentence for sentence in (_source_mirror(body), _shaped(body), _envelopes(body)) if sentence]
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
         found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
@@ -121,6 +121,18 @@ def _envelopes(body: Body) -> str:
             return (
                 f"{obj.name} {phrase}, which its weights do not tell, so garments will move otherwise: "
                 "bind it by Vertex Groups alone and transfer again"
+            )
+    return ""
+
+
+def _shaped(body: Body) -> str:
+    """What shapes the body's pose by places that stay where they are moves no garment in the same way."""
+    for obj in body.objects:
+        found = stack.shaping_the_pose(obj, body.objects)
+        if found:
+            return (
+                f"The modifier {found[0].name} of {obj.name} comes after the armature and shapes its pose, which no "
+                "weights can follow: move it above the Armature modifier"
             )
     return ""
 
