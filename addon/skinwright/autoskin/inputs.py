@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, editable, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
+from ..scene import armature, editable, evaluation, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import completion, merging
@@ -46,6 +46,7 @@ class Target:
 
 def read(objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, params: AutoskinParams) -> list[Target]:
     """Every mesh, with `rig` or the armature that deforms it. Raises SceneError with the object, problem and cure."""
+    evaluation.bring_up_to_date([*objects, *([rig] if rig else [])])
     rigs = [_rig_of(obj, rig) for obj in objects]
     editable.check_separate(objects)
     bones = {one.name: _bones_of(one) for one in dict.fromkeys(rigs)}

@@ -14,7 +14,7 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names, whole
 from ..retarget.inputs import joined_rows
-from ..scene import armature, attaching, embedded, object_state, rest_bones
+from ..scene import armature, attaching, embedded, evaluation, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..scene.watched import Watched
@@ -65,6 +65,8 @@ def steps(
     """The same, job by job. Nothing is made before all is computed."""
     source = _rig_of(source)
     targets = list(dict.fromkeys(targets))  # one named twice is one
+    donors = rest_bones.meshes(source, context.scene)
+    evaluation.bring_up_to_date([source, *donors, *targets])
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
@@ -80,7 +82,7 @@ def steps(
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
     if params.method == "template":
-        donor = _donor(context, source, bones)
+        donor = _donor(source, donors, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
     watched = Watched([source, *targets])
@@ -100,9 +102,9 @@ def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
 
 
 def _donor(
-    context: bpy.types.Context, source: bpy.types.Object, bones: RestBones
+    source: bpy.types.Object, donors: list[bpy.types.Object], bones: RestBones
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], Rows]:
-    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups and obj.data.edges]
+    meshes = [obj for obj in donors if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(
             f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, editable, landmarks, rest_bones, vertex_groups
+from ..scene import armature, editable, evaluation, landmarks, rest_bones, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import merging
@@ -131,6 +131,7 @@ def by_character(
 
 
 def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:
+    evaluation.bring_up_to_date([rig, *meshes])
     return Character(rig, rest_bones_of(rig), meshes, whole.read(meshes, rig))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, mesh, shapes, sides
+from ..scene import armature, evaluation, mesh, shapes, sides
 from ..scene.error import SceneError
 from . import parts
 from .params import TransferParams
@@ -73,7 +73,9 @@ class Body:
 
 def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bpy.types.Object] | None = None) -> Body:
     """The source's shape and the weights of the groups that take part; `targets` are never part of it."""
+    evaluation.bring_up_to_date([source])  # which meshes continue it is told by their places
     objects = _body_objects(source, targets or [], params)
+    evaluation.bring_up_to_date(objects)
     rigs = _rigs(objects)
     bones, chosen = choose_groups(objects, rigs, params.groups)
     fields = [name for name in chosen if name not in bones]

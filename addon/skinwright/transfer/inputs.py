@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, binding, mask, mesh, mirror, modifiers, shapes, symmetry, vertex_groups
+from ..scene import armature, binding, evaluation, mask, mesh, mirror, modifiers, shapes, symmetry, vertex_groups
 from ..scene.error import SceneError
 from . import completion, merging
 from .body import Body, read_body
@@ -56,6 +56,7 @@ class Garment:
 def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -> Garment:
     """A target's shape, mask and locks; its old weights only where they take part in the new ones."""
     start = time.perf_counter()
+    evaluation.bring_up_to_date([target])
     locks = vertex_groups.locked(target)
     own_bones = _bone_names(target, body) & {group.name for group in target.vertex_groups}
     names = body.bones + sorted(own_bones - set(body.bones))
