@@ -65,7 +65,7 @@ def steps(
     """The same, job by job. Nothing is made before all is computed."""
     source = _rig_of(source)
     targets = list(dict.fromkeys(targets))  # one named twice is one
-    donors = rest_bones.meshes(source, context.scene)
+    donors, left_out = rest_bones.visible(rest_bones.meshes(source, context.scene), source)
     evaluation.bring_up_to_date([source, *donors, *targets])
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
@@ -90,7 +90,10 @@ def steps(
         targets[0].name, (seen.positions, seen.triangles), arrays, donor, **options
     )
     watched.check()
-    return _write(context, source, list(targets), bones, embedding, params)
+    report = _write(context, source, list(targets), bones, embedding, params)
+    if donor and left_out:
+        report.warnings.append(rest_bones.left_out_of(source, left_out))
+    return report
 
 
 def _rig_of(source: bpy.types.Object) -> bpy.types.Object:

@@ -23,6 +23,16 @@ class Follower:
     end: Callable[[], None]
 
 
+@dataclass(frozen=True)
+class _Binding:
+    """How weights are to act: in armatures `rigs`, as in the modifiers `models` of a source, `as_child` if as a child
+    of one too."""
+
+    rigs: list[bpy.types.Object]
+    models: list[bpy.types.ArmatureModifier]
+    as_child: bool
+
+
 def others(
     obj: bpy.types.Object, sources: list[bpy.types.Object], groups: Iterable[str], world: Matrix
 ) -> list[Follower]:
@@ -30,16 +40,30 @@ def others(
 
     `world` is where the object is to stay once a parent or constraint lets it go.
     """
+    model = sources[0]
+    binding = _Binding(armature.rigs(model), armature.modifiers(model), model.parent_type == "ARMATURE")
+    return _others(obj, sources, binding, set(groups), world)
+
+
+def phrases(obj: bpy.types.Object, rig: bpy.types.Object, groups: Iterable[str]) -> list[str]:
+    """What beside weights in `groups`, for the bones of `rig`, moves `obj`; or writes these groups."""
+    found = _others(obj, [obj], _Binding([rig], [], as_child=False), set(groups), obj.matrix_world.copy())
+    return [follower.phrase for follower in found]
+
+
+def _others(
+    obj: bpy.types.Object, sources: list[bpy.types.Object], binding: _Binding, groups: set[str], world: Matrix
+) -> list[Follower]:
     return [
         *_parents(obj, sources, world),
         *_constraints(obj, sources, world),
         *_drivers(obj, sources, world),
-        *_armatures(obj, sources),
-        *_switched_off(obj, sources),
+        *_armatures(obj, binding),
+        *_switched_off(obj, binding),
         *_surfaces(obj, sources),
         *_caches(obj),
         *shaping(obj, sources),
-        *_overruled(obj, set(groups)),
+        *_overruled(obj, groups),
     ]
 
 
@@ -79,12 +103,11 @@ def _mute(obj: bpy.types.Object, follows: bpy.types.Constraint | bpy.types.FCurv
     obj.matrix_world = world
 
 
-def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+def _armatures(obj: bpy.types.Object, binding: _Binding) -> list[Follower]:
     """Armature modifiers that are not bound as the source is; ending one removes it."""
-    models = [model for model in armature.modifiers(sources[0]) if model.show_viewport]
+    models, rigs = [model for model in binding.models if model.show_viewport], binding.rigs
     found: list[tuple[tuple, tuple[str, bpy.types.ArmatureModifier]]] = []
     seen = [(model.object, _binding(model)) for model in models]
-    rigs = armature.rigs(sources[0])
     for modifier in armature.modifiers(obj):
         if not modifier.show_viewport and (modifier.object in rigs or not modifier.show_render):
             continue  # told by _switched_off, or it does nothing
@@ -101,20 +124,19 @@ def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[F
         phrase = f"is deformed as a child of {parent.name} and not by {rigs[0].name}"
         listed.append(Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT")))
     by_modifier = [rig for (rig, _), (phrase, _) in found if not phrase]
-    if obj.parent_type == "ARMATURE" and obj.parent in by_modifier and sources[0].parent_type != "ARMATURE":
+    if obj.parent_type == "ARMATURE" and obj.parent in by_modifier and not binding.as_child:
         phrase = f"is deformed by {obj.parent.name} twice, by a modifier and as its child"
         listed.append(Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT")))
     return listed
 
 
-def _switched_off(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+def _switched_off(obj: bpy.types.Object, binding: _Binding) -> list[Follower]:
     """Armature modifiers that are off where the source's are on; ending one turns it on."""
-    models = armature.modifiers(sources[0])
     found = []
     for modifier in armature.modifiers(obj):
         for name, where in (("show_viewport", "the viewport"), ("show_render", "renders")):
-            on = [model for model in models if getattr(model, name) and model.object == modifier.object]
-            if on and not getattr(modifier, name):
+            on = [model.object for model in binding.models if getattr(model, name)] if binding.models else binding.rigs
+            if modifier.object in on and not getattr(modifier, name):
                 phrase = f"has the modifier {modifier.name}, which is off in {where}"
                 found.append(Follower(phrase, partial(_switch_on, modifier)))
                 break

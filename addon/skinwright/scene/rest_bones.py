@@ -46,3 +46,18 @@ def meshes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Obje
     """The scene's meshes that an armature deforms, by name."""
     found = [obj for obj in scene.objects if obj.type == "MESH" and armature.find(obj) == rig]
     return sorted(found, key=lambda obj: obj.name)
+
+
+def visible(
+    meshes: Sequence[bpy.types.Object], picked: bpy.types.Object
+) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
+    """Those of a character's meshes that can be seen or were picked, and the others: levels of detail, collision hulls,
+    older versions. If none can be seen, all count."""
+    seen = [obj for obj in meshes if obj.visible_get() or obj == picked]
+    return (seen, [obj for obj in meshes if obj not in seen]) if seen else (list(meshes), [])
+
+
+def left_out_of(rig: bpy.types.Object, meshes: Sequence[bpy.types.Object]) -> str:
+    """What to say of hidden meshes that took no part."""
+    names = ", ".join(obj.name for obj in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
+    return f"Hidden meshes on {rig.name} took no part in its shape and weights: {names}; show those that should"

@@ -85,32 +85,8 @@ def _shear(body: Body, garment: Garment) -> str:
 
 
 def _mirror(body: Body, garment: Garment) -> str:
-    """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
-    obj, shape = garment.object, garment.shape
-    posed = mirror.after_the_pose(obj)
-    if posed:
-        return (
-            f"The modifier {posed[0].name} of {obj.name} comes after the armature, so that the half it makes mirrors "
-            "the pose of the other: move it above the Armature modifier and transfer again"
-        )
-    found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
-    wrong = [reflection for reflection in found if not mirror.is_right(reflection, body.armature, body.opposite)]
-    if not wrong:
-        return ""
-    named = wrong[0].name
-    exchanged = sides.exchanged(body.armature, body.opposite, wrong[0].world)
-    if not wrong[0].flips:
-        return f"Vertex Groups is off in the modifier {named} of {obj.name}: both sides will follow the bones of one"
-    if exchanged is False:
-        return (
-            f"The modifier {named} of {obj.name} exchanges left and right in a copy that lies on the same side: "
-            "apply it and transfer again"
-        )
-    name = sides.unflippable(body.opposite)
-    return (
-        f"The modifier {named} of {obj.name} cannot tell that {body.opposite[name]} mirrors {name}, "
-        "so both sides will follow the bones of one: apply it and transfer again, or rename the bones"
-    )
+    shape = garment.shape
+    return mirror.warning(garment.object, shape.matrix, shape.geometry.positions, body.armature, body.opposite)
 
 
 def _envelopes(body: Body) -> str:
