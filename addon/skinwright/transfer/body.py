@@ -22,7 +22,7 @@ class Body:
     `objects` are the meshes that are its body, the picked one first; `rigs` the armatures that deform it. The rows over
     `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks), each carried
     over by itself. `chosen` names the groups to be written. `opposite` has the other side's bone of every bone.
-    `hidden` names what hides a part of the surface, and the points (n, 3) there.
+    `hidden` names what hides a part of the surface, and the points (n, 3) there; `unseen` what was left out.
     """
 
     object: bpy.types.Object
@@ -36,6 +36,7 @@ class Body:
     chosen: set[str]
     opposite: dict[str, str]
     hidden: tuple[str, NDArray[np.float32]] | None = None
+    unseen: str = ""
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -101,7 +102,14 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
         chosen=set(chosen),
         opposite=sides.opposites(rigs[0] if rigs else None, bones),
         hidden=next((each for each in hidden if each), None),
+        unseen=_unseen(objects, [shape for shape, _ in seen]),
     )
+
+
+def _unseen(objects: list[bpy.types.Object], seen: list[shapes.Shape]) -> str:
+    """The modifiers that were left out, in words, or nothing."""
+    left_out = [(obj.name, shape.unseen) for obj, shape in zip(objects, seen, strict=True) if shape.unseen]
+    return " and ".join(f"the modifier {', '.join(names)} of {name}" for name, names in left_out)
 
 
 def _split_columns(rows: Rows, n_left: int) -> tuple[Rows, Rows]:

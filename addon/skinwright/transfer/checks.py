@@ -42,7 +42,9 @@ def target_problem(
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
-    found = [sentence for sentence in (_source_mirror(body), _shaped(body), _envelopes(body)) if sentence]
+    found = [
+        sentence for sentence in (_left_out(body), _source_mirror(body), _shaped(body), _envelopes(body)) if sentence
+    ]
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
         found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
@@ -99,6 +101,16 @@ def _envelopes(body: Body) -> str:
                 "bind it by Vertex Groups alone and transfer again"
             )
     return ""
+
+
+def _left_out(body: Body) -> str:
+    """Modifiers with which the body would have no surface, or none that has weights."""
+    if not body.unseen:
+        return ""
+    return (
+        f"With {body.unseen} there are no faces that have weights, so it was left out: apply it and weight what it "
+        "makes if that shape counts"
+    )
 
 
 def _shaped(body: Body) -> str:
