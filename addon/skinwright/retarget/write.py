@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..scene import attributes, editable, followers, mirror, object_state, rest_bones, sides, vertex_groups
+from ..transfer import strangers
 from .compute import Result
 from .inputs import Character, Pair
 from .params import RetargetParams
@@ -75,6 +76,7 @@ def _write_mesh(
 
 def _warnings(pair: Pair, result: Result) -> list[str]:
     warnings = [rest_bones.left_out_of(pair.source.armature, pair.source.left_out)] if pair.source.left_out else []
+    warnings += strangers.warnings(pair.source.meshes, [pair.source.armature], pair.source.bones.names)
     alone = [entry.target for entry in pair.matches if not entry.source]
     if alone:
         warnings.append(f"Bones of {pair.target.armature.name} without a partner get no weight: {_listed(alone)}")

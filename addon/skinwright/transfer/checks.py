@@ -7,6 +7,7 @@ import numpy as np
 
 from ..scene import armature, editable, mesh, mirror, sides, stack, vertex_groups
 from ..scene.error import SceneError
+from . import strangers
 from .inputs import Body, Garment
 from .params import TransferParams
 
@@ -45,6 +46,7 @@ def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     found = [
         sentence for sentence in (_left_out(body), _source_mirror(body), _shaped(body), _envelopes(body)) if sentence
     ]
+    found += strangers.warnings(body.objects, body.rigs, body.bones)
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
         found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
