@@ -14,7 +14,7 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names, whole
 from ..retarget.inputs import joined_rows
-from ..scene import armature, attaching, embedded, evaluation, object_state, rest_bones
+from ..scene import armature, attaching, embedded, evaluation, followers, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..scene.watched import Watched
@@ -90,7 +90,10 @@ def steps(
         targets[0].name, (seen.positions, seen.triangles), arrays, donor, **options
     )
     watched.check()
+    misfit = _misfit(source, donor[0]) if donor else ""
     report = _write(context, source, list(targets), bones, embedding, params)
+    if misfit:
+        report.warnings.append(misfit)
     if donor and left_out:
         report.warnings.append(rest_bones.left_out_of(source, left_out))
     return report
@@ -116,6 +119,12 @@ def _donor(
     seen = whole.read(meshes, source)
     _check_extent(meshes[0], seen.positions)
     return seen.positions, seen.triangles, seen.rows(joined_rows(meshes, bones.names), source, bones.names)
+
+
+def _misfit(source: bpy.types.Object, positions: NDArray[np.float32]) -> str:
+    """Controls may lie anywhere, so that deforming bones count."""
+    deforming = sorted(armature.deform_bones(source)) or source.data.bones.keys()
+    return rest_bones.misfit(source, rest_bones.read(source, deforming), positions)
 
 
 def _check_extent(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:
@@ -157,6 +166,10 @@ def _write(
             for obj in targets if params.bind else ():
                 if armature.find(obj) is None:
                     attaching.bind(obj, rig)
+                warnings += [
+                    f"{obj.name} {phrase}: end that if {rig.name} alone is to move it"
+                    for phrase in followers.phrases(obj, rig, ())
+                ]
             return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
     except BaseException:
         embedded.remove(rig)

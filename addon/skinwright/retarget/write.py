@@ -76,6 +76,8 @@ def _write_mesh(
 
 def _warnings(pair: Pair, result: Result) -> list[str]:
     warnings = [rest_bones.left_out_of(pair.source.armature, pair.source.left_out)] if pair.source.left_out else []
+    for one in (pair.source, pair.target):
+        warnings += [text for text in [rest_bones.misfit(one.armature, one.bones, one.positions)] if text]
     warnings += strangers.warnings(pair.source.meshes, [pair.source.armature], pair.source.bones.names)
     alone = [entry.target for entry in pair.matches if not entry.source]
     if alone:

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from . import armature, mesh
 
+# How far from its meshes' box a bone may lie, as a part of the box's diagonal.
+_MARGIN = 0.2
+
 
 @dataclass(frozen=True)
 class RestBones:
@@ -61,3 +64,18 @@ def left_out_of(rig: bpy.types.Object, meshes: Sequence[bpy.types.Object]) -> st
     """What to say of hidden meshes that took no part."""
     names = ", ".join(obj.name for obj in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
     return f"Hidden meshes on {rig.name} took no part in its shape and weights: {names}; show those that should"
+
+
+def misfit(rig: bpy.types.Object, bones: RestBones, positions: NDArray[np.float32]) -> str:
+    """A sentence where most bones lie outside of the box around their meshes' points (V, 3): one of both was scaled or
+    moved without the other."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    margin = _MARGIN * float(np.linalg.norm(high - low))
+    middles = (bones.heads + bones.tails) / 2
+    outside = ((middles < low - margin) | (middles > high + margin)).any(axis=1)
+    if outside.mean() <= 0.5:
+        return ""
+    return (
+        f"{int(outside.sum())} of {len(outside)} bones of {rig.name} lie far from the meshes on it: are scale and "
+        "place of both as they should be?"
+    )
