@@ -12,7 +12,7 @@ import time
 import bpy
 
 from .. import jobs, native
-from ..scene import armature, brush, changes, mask, vertex_groups, weight_state
+from ..scene import armature, attaching, brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.compute import Result
 from ..transfer.params import TransferParams
@@ -71,7 +71,7 @@ class MaskPainting:
         source = bpy.data.objects.get(self.source)
         if source and armature.find(source) and armature.find(target) is None:
             # Else the artist would see no weight at work.
-            self._modifiers = armature.attach(target, source)
+            self._modifiers = attaching.attach(target, source)
 
     @property
     def armature_added(self) -> bool:
