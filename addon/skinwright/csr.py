@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+# Places in a table for each of the entries that are added up in it.
+_DENSE = 16
+
 
 class Rows(NamedTuple):
     """Weights as CSR: row r spans `bones` and `values` from indptr[r] to indptr[r + 1]; bones index a list of names."""
@@ -34,9 +37,15 @@ def row_sums(rows: Rows) -> NDArray[np.float64]:
 def from_entries(vertex: NDArray, bone: NDArray, value: NDArray, n_rows: int) -> Rows:
     """Rows of entries in any order; entries of one place are added up, those of weight 0 dropped."""
     width = int(bone.max(initial=0)) + 1
-    place, inverse = np.unique(vertex.astype(np.int64) * width + bone, return_inverse=True)
-    total = np.bincount(inverse, weights=value, minlength=len(place))
-    place, total = place[total != 0], total[total != 0]
+    place = vertex.astype(np.int64) * width + bone
+    if n_rows * width <= _DENSE * len(place):  # a table is faster than sorting
+        table = np.bincount(place, weights=value, minlength=n_rows * width)
+        place = np.flatnonzero(table)
+        total = table[place]
+    else:
+        place, inverse = np.unique(place, return_inverse=True)
+        total = np.bincount(inverse, weights=value, minlength=len(place))
+        place, total = place[total != 0], total[total != 0]
     indptr = np.concatenate([[0], np.cumsum(np.bincount(place // width, minlength=n_rows), dtype=np.int64)])
     return Rows(indptr.astype(np.uint32), (place % width).astype(np.uint32), total.astype(np.float32))
 

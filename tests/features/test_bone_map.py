@@ -66,3 +66,36 @@ def test_given_pairs_win(modules):
     giver = skeleton(modules, ["a", "b"], [(0, 0, 0), (0, 0, 1)], [-1, 0])
     found = modules[0].match(giver, giver, {"a": "b", "b": ""})
     assert [(entry.source, entry.how) for entry in found] == [("b", "given"), ("", "given")]
+
+
+def leg(modules, names, at=0.0):
+    """Hips with a thigh and a shin on each side; `names` are those of the left leg."""
+    right = [name.replace("Left", "Right").replace(".L", ".R") for name in names]
+    heads = [(0, 0, 1), (0.1, 0, 0.9), (0.1, 0, 0.5 + at), (-0.1, 0, 0.9), (-0.1, 0, 0.5 + at)]
+    return skeleton(modules, ["Hips", *names, *right], heads, [-1, 0, 1, 0, 3])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("first", [("Leg.L", "Shin.L"), ("Thigh.L", "UpLeg.L")])
+def test_a_leg_that_is_a_thigh_here_and_a_shin_there(modules, first, turned):
+    """Mixamo calls the shin leg."""
+    second = ("LeftUpLeg", "LeftLeg")
+    giver, taker = (leg(modules, names) for names in ((second, first) if turned else (first, second)))
+    found = {entry.target: entry.source for entry in modules[0].match(giver, taker)}
+    assert found == dict(zip(taker.names, giver.names, strict=True))
+
+
+def test_a_bone_map_that_is_given_is_not_corrected(modules):
+    giver, taker = leg(modules, ("Leg.L", "Shin.L")), leg(modules, ("LeftUpLeg", "LeftLeg"))
+    found = {entry.target: entry for entry in modules[0].match(giver, taker, {"LeftLeg": "Leg.L"})}
+    assert found["LeftLeg"].source == "Leg.L" and found["RightLeg"].source == "Shin.R"
+    sources = [entry.source for entry in found.values() if entry.source]
+    assert len(sources) == len(set(sources))
+
+
+def test_an_order_that_fits_the_places_worse_corrects_nothing(modules):
+    """One rig has a bone more above, and another bone more below, and the name is right."""
+    giver = skeleton(modules, ["Hips", "Leg.L", "Toe.L"], [(0, 0, 1), (0.1, 0, 0.9), (0.1, 0, 0)], [-1, 0, 1])
+    taker = skeleton(modules, ["Hips", "Root.L", "Leg.L"], [(0, 0, 1), (0, 0, 1.02), (0.1, 0, 0.9)], [-1, 0, 1])
+    found = {entry.target: entry.source for entry in modules[0].match(giver, taker)}
+    assert found["Leg.L"] == "Leg.L"

@@ -11,6 +11,7 @@ import figure
 import numpy as np
 import pytest
 
+Matrix = pytest.importorskip("mathutils", reason="needs the bpy wheel").Matrix
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 bmesh = pytest.importorskip("bmesh", reason="needs the bpy wheel")
 
@@ -192,3 +193,38 @@ def test_three_presses_take_a_bare_mesh_to_a_pose(man):
     near = (np.linalg.norm(rest - knee, axis=1) < 0.12) & (rest[:, 0] > 0.02)
     assert near.any() and np.linalg.norm(refined - plain, axis=1)[near].max() > 1e-3
     assert child.data.shape_keys and len(child.data.shape_keys.key_blocks) > 1
+
+
+def test_a_mesh_that_follows_another_armature_is_named(addon, man):
+    child = bare("Child")
+    figure.bind(child, figure.bones({"Old": ((0, 0, 0), (0, 0, 1), None)}, "Old Rig"))
+    builders.select(child)
+    assert bpy.ops.skinwright.embed_armature() == {"FINISHED"}
+    assert "Child is deformed by Old Rig and not by Child Rig" in " ".join(addon.reporting.last.warnings)
+
+
+@pytest.mark.parametrize("what", ["armature", "landmark"])
+def test_what_is_new_finds_a_collection_though_the_active_one_is_linked(addon, man, what, tmp_path):
+    library = bpy.data.collections.new("Library")
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {library})
+    bpy.data.collections.remove(library)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Library"]
+    bpy.context.scene.collection.children.link(wanted.collections[0])
+    child = bare("Child")
+    layer = bpy.context.view_layer
+    layer.active_layer_collection = layer.layer_collection.children["Library"]
+    if what == "armature":
+        made = embed(child)
+    else:
+        made = addon.scene.landmarks.add_empty(bpy.context, "Chin", child.location, 0.1)
+    assert list(made.users_collection) == [bpy.context.scene.collection]
+
+
+def test_a_template_whose_bones_lie_elsewhere_is_named(addon, man):
+    """The scale of the rig was applied, and not that of its mesh."""
+    for child in man.children:
+        child.data.transform(Matrix.Scale(0.01, 4))
+    builders.select(bare("Child"))
+    bpy.ops.skinwright.embed_armature()
+    assert "bones of Man Rig lie far from the meshes on it" in " ".join(addon.reporting.last.warnings)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 
 pytest.importorskip("bpy", reason="needs the bpy wheel")
 N, B = 7, 6
@@ -153,3 +154,14 @@ def test_entries_of_one_place_are_added(csr):
     rows = csr.from_entries(np.array([1, 0, 1]), np.array([2, 0, 2]), np.array([0.25, 0.0, 0.5]), 3)
     assert rows.indptr.tolist() == [0, 0, 1, 1]
     assert rows.values.tolist() == [0.75]
+
+
+@pytest.mark.parametrize("n_columns", [3, 5000], ids=["dense", "sparse"])
+def test_entries_are_added_as_scipy_adds_them(csr, n_columns):
+    rng = np.random.default_rng(8)
+    vertex, bone = rng.integers(0, 40, 300), rng.integers(0, n_columns, 300)
+    value = rng.integers(0, 4, 300) / 4  # sums are exact, some entries are 0
+    rows = csr.from_entries(vertex, bone, value, 41)
+    expected = sparse.coo_array((value, (vertex, bone)), shape=(41, n_columns)).toarray()
+    assert np.array_equal(dense_of(csr, rows, n_columns), expected)
+    assert (rows.values != 0).all()

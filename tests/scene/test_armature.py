@@ -48,17 +48,17 @@ def test_is_posed(armature):
     assert not armature.is_posed(rig)
 
 
-def test_attach_goes_after_mirrors_and_before_the_rest(armature):
+def test_attach_goes_after_mirrors_and_before_the_rest(addon, armature):
     obj, rig = builders.grid("Garment", 3), builders.rig()
     for kind in ("MIRROR", "SUBSURF"):
         obj.modifiers.new(kind, kind)
     body = builders.body(3, rig)
-    armature.attach(obj, body)
+    addon.scene.attaching.attach(obj, body)
     assert [m.type for m in obj.modifiers] == ["MIRROR", "ARMATURE", "SUBSURF"]
     assert armature.find(obj) == rig
 
 
-def test_attach_takes_the_settings_of_the_sources_modifiers(armature):
+def test_attach_takes_the_settings_of_the_sources_modifiers(addon, armature):
     """A body with two modifiers, each on a part of it, as some exporters make for fingers."""
     body, obj = builders.body(3), builders.grid("Garment", 3)
     rig = body.find_armature()
@@ -67,17 +67,17 @@ def test_attach_takes_the_settings_of_the_sources_modifiers(armature):
     second = body.modifiers.new("Fingers", "ARMATURE")
     second.object, second.vertex_group, second.use_multi_modifier = rig, "pin", True
     builders.paint(obj, pin=0.5)
-    armature.attach(obj, body)
+    addon.scene.attaching.attach(obj, body)
     settings = [[getattr(m, name) for name in armature.BINDING] for m in obj.modifiers]
     assert settings == [[getattr(m, name) for name in armature.BINDING] for m in body.modifiers]
 
 
-def test_attach_to_a_body_that_is_only_parented(armature):
+def test_attach_to_a_body_that_is_only_parented(addon):
     body, obj = builders.body(3), builders.grid("Garment", 3)
     rig = body.find_armature()
     body.modifiers.clear()
     body.parent, body.parent_type = rig, "ARMATURE"
-    armature.attach(obj, body)
+    addon.scene.attaching.attach(obj, body)
     assert [m.object for m in obj.modifiers] == [rig]
 
 

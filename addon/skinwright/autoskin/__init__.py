@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import csr, jobs
 from ..reporting import AutoskinReport, SkinnedMesh
-from ..scene import armature, carried, editable, object_state, vertex_groups
+from ..scene import armature, attaching, editable, followers, object_state, vertex_groups
 from ..scene.watched import Watched
 from .compute import Answer, compute
 from .inputs import Target, read
@@ -50,17 +50,17 @@ def _write(target: Target, answer: Answer, params: AutoskinParams) -> SkinnedMes
     rows = csr.take_columns(csr.take_rows(answer.rows, target.vertices), target.computed)
     vertex_groups.write(obj, written, rows, target.vertices)
     if armature.find(obj) is None:
-        armature.bind(obj, rig, make_parent=params.make_parent)
+        attaching.bind(obj, rig, make_parent=params.make_parent)
     columns = int(np.count_nonzero(target.chosen))
-    return SkinnedMesh(obj.name, rig.name, len(target.vertices), columns, answer.outside, _notes(obj, rig))
+    return SkinnedMesh(obj.name, rig.name, len(target.vertices), columns, answer.outside, _notes(target))
 
 
-def _notes(obj: bpy.types.Object, rig: bpy.types.Object) -> list[str]:
+def _notes(target: Target) -> list[str]:
     """What keeps the new weights from moving the mesh as they say, and whom they move too."""
-    found = [editable.changes_others(obj)]
-    own = armature.find(obj)
-    if own != rig and own is not None:
-        found.append(f"{obj.name} is deformed by {own.name} and not by {rig.name}: name {rig.name} in its modifier")
-    carried_by = [carried.by_parent(obj, []), *(phrase for phrase, _ in carried.by_constraints(obj, []))]
-    found += [f"{obj.name} {phrase} and so moves twice: end that, or the weights" for phrase in carried_by if phrase]
+    obj, rig = target.object, target.rig
+    found = [editable.changes_others(obj), target.mirror_warning]
+    found += [
+        f"{obj.name} {phrase}: end that if the weights alone are to move it"
+        for phrase in followers.phrases(obj, rig, target.bones.names)
+    ]
     return [note for note in found if note]

@@ -11,6 +11,7 @@ from .. import csr, native, soundness
 from ..csr import Rows
 from ..declared import native_keywords
 from ..jobs import Jobs
+from ..scene import orientation
 from ..transfer import merging, parts
 from .inputs import Target
 from .params import AutoskinParams
@@ -56,7 +57,7 @@ def _solve(targets: list[Target], params: AutoskinParams) -> Jobs[list[Answer]]:
     job = native.start_automatic_weights(
         " + ".join(target.object.name for target in targets),
         geometry.positions,
-        geometry.triangles,
+        orientation.outward(geometry.positions, geometry.triangles),
         np.stack([bones.heads, bones.tails], axis=1)[computed].astype(np.float32),
         _parents(bones.parents, computed),
         **keywords,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, editable, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
+from ..scene import armature, editable, evaluation, mesh, mirror, rest_bones, shapes, sides, symmetry, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import completion, merging
@@ -23,7 +23,7 @@ class Target:
     `computed` (B,) marks the bones that take part, which are those whose groups are not locked; `chosen` (B,) those of
     them that are written from the answer, while the rest make room. `opposite` (B,) is the other side's bone.
     `before` are the old rows, empty where they take no part; `share` is how much of the new rows is taken, (V,) or one
-    for all.
+    for all. `mirror_warning` says why a half that a modifier adds will not follow its side.
     """
 
     object: bpy.types.Object
@@ -36,6 +36,7 @@ class Target:
     before: Rows
     share: NDArray[np.float64] | float
     vertices: NDArray[np.int64]
+    mirror_warning: str
 
     @property
     def joins_old_weights(self) -> bool:
@@ -46,6 +47,7 @@ class Target:
 
 def read(objects: Sequence[bpy.types.Object], rig: bpy.types.Object | None, params: AutoskinParams) -> list[Target]:
     """Every mesh, with `rig` or the armature that deforms it. Raises SceneError with the object, problem and cure."""
+    evaluation.bring_up_to_date([*objects, *([rig] if rig else [])])
     rigs = [_rig_of(obj, rig) for obj in objects]
     editable.check_separate(objects)
     bones = {one.name: _bones_of(one) for one in dict.fromkeys(rigs)}
@@ -98,6 +100,7 @@ def _read_target(obj: bpy.types.Object, rig: bpy.types.Object, bones: RestBones,
         )
     chosen = _chosen(obj, rig, bones, computed, params)
     share = _share(obj, params)
+    shape = _shape(obj, params)
     partial = not chosen.all() or params.mix_factor < 1 or bool(params.mask_group)
     target = Target(
         object=obj,
@@ -106,10 +109,13 @@ def _read_target(obj: bpy.types.Object, rig: bpy.types.Object, bones: RestBones,
         computed=computed,
         chosen=chosen,
         opposite=_opposite_columns(rig, bones.names),
-        completion=_completed(obj, rig, bones.names, params),
+        completion=_completed(obj, rig, bones.names, shape, params),
         before=vertex_groups.read(obj, bones.names if partial else []),
         share=share,
         vertices=_vertices(obj, share, params),
+        mirror_warning=mirror.warning(
+            obj, shape.matrix, shape.geometry.positions, rig, sides.opposites(rig, bones.names)
+        ),
     )
     _check_locks(target, locks)
     return target
@@ -153,11 +159,17 @@ def _opposite_columns(rig: bpy.types.Object, names: list[str]) -> NDArray[np.int
     return np.array([index.get(opposite[name], index[name]) for name in names], np.int64)
 
 
-def _completed(obj: bpy.types.Object, rig: bpy.types.Object, names: list[str], params: AutoskinParams) -> Completion:
-    """With the halves that Mirror modifiers add, if the weights that these give them are the right ones."""
+def _shape(obj: bpy.types.Object, params: AutoskinParams) -> shapes.Shape:
     shape = shapes.read_target(obj, params.geometry)
     if not len(shape.geometry.triangles):
         raise SceneError(f"{obj.name} has no faces: this works along surfaces, so give it some")
+    return shape
+
+
+def _completed(
+    obj: bpy.types.Object, rig: bpy.types.Object, names: list[str], shape: shapes.Shape, params: AutoskinParams
+) -> Completion:
+    """With the halves that Mirror modifiers add, if the weights that these give them are the right ones."""
     known = sides.opposites(rig, names)
     found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
     reflections = [reflection for reflection in found if mirror.is_right(reflection, rig, known)]

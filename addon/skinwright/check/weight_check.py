@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import csr, jobs, native
 from ..jobs import Jobs
-from ..scene import armature, followers, mesh, mirror, places, poses, shapes, skeleton, vertex_groups
+from ..scene import armature, evaluation, followers, mesh, mirror, places, poses, shapes, skeleton, vertex_groups
 from ..scene.error import SceneError
 from . import body_plan
 from .params import CheckParams
@@ -87,6 +87,7 @@ def check(target: bpy.types.Object, source: bpy.types.Object | None, params: Che
 
 def steps(target: bpy.types.Object, source: bpy.types.Object | None, params: CheckParams) -> Jobs[WeightCheck]:
     """The same as a generator of jobs, for a window that must live on meanwhile."""
+    evaluation.bring_up_to_date([target, *([source] if source else [])])
     rigs = armature.rigs(target) or [rig for rig in [armature.find(target)] if rig]
     if not rigs:
         raise SceneError(f"{target.name} has no armature to pose it: give it an Armature modifier")

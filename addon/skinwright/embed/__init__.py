@@ -14,7 +14,7 @@ from ..declared import native_keywords
 from ..jobs import Jobs
 from ..retarget import bone_names, whole
 from ..retarget.inputs import joined_rows
-from ..scene import armature, embedded, object_state, rest_bones
+from ..scene import armature, attaching, embedded, evaluation, followers, object_state, rest_bones
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..scene.watched import Watched
@@ -65,6 +65,8 @@ def steps(
     """The same, job by job. Nothing is made before all is computed."""
     source = _rig_of(source)
     targets = list(dict.fromkeys(targets))  # one named twice is one
+    donors, left_out = rest_bones.visible(rest_bones.meshes(source, context.scene), source)
+    evaluation.bring_up_to_date([source, *donors, *targets])
     bones = rest_bones.read(source, [bone.name for bone in source.data.bones])
     if not bones.names:
         raise SceneError(f"{source.name} has no bones: pick the armature of another character")
@@ -80,7 +82,7 @@ def steps(
     options: dict[str, Any] = native_keywords(params)
     donor: tuple = ()
     if params.method == "template":
-        donor = _donor(context, source, bones)
+        donor = _donor(source, donors, bones)
         options |= {"mirror": mirror(bones.names)} if params.symmetric else {}
     arrays = (bones.heads.astype(np.float32), bones.tails.astype(np.float32), bones.parents)
     watched = Watched([source, *targets])
@@ -88,7 +90,13 @@ def steps(
         targets[0].name, (seen.positions, seen.triangles), arrays, donor, **options
     )
     watched.check()
-    return _write(context, source, list(targets), bones, embedding, params)
+    misfit = _misfit(source, donor[0]) if donor else ""
+    report = _write(context, source, list(targets), bones, embedding, params)
+    if misfit:
+        report.warnings.append(misfit)
+    if donor and left_out:
+        report.warnings.append(rest_bones.left_out_of(source, left_out))
+    return report
 
 
 def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
@@ -100,9 +108,9 @@ def _rig_of(source: bpy.types.Object) -> bpy.types.Object:
 
 
 def _donor(
-    context: bpy.types.Context, source: bpy.types.Object, bones: RestBones
+    source: bpy.types.Object, donors: list[bpy.types.Object], bones: RestBones
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], Rows]:
-    meshes = [obj for obj in rest_bones.meshes(source, context.scene) if obj.vertex_groups and obj.data.edges]
+    meshes = [obj for obj in donors if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(
             f"{source.name} deforms no mesh that has weights: pick the armature of a skinned character, "
@@ -111,6 +119,12 @@ def _donor(
     seen = whole.read(meshes, source)
     _check_extent(meshes[0], seen.positions)
     return seen.positions, seen.triangles, seen.rows(joined_rows(meshes, bones.names), source, bones.names)
+
+
+def _misfit(source: bpy.types.Object, positions: NDArray[np.float32]) -> str:
+    """Controls may lie anywhere, so that deforming bones count."""
+    deforming = sorted(armature.deform_bones(source)) or source.data.bones.keys()
+    return rest_bones.misfit(source, rest_bones.read(source, deforming), positions)
 
 
 def _check_extent(obj: bpy.types.Object, positions: NDArray[np.float32]) -> None:
@@ -151,7 +165,11 @@ def _write(
             embedded.mark(rig, confidence, {bone for bone, value in confidence.items() if value < UNSURE})
             for obj in targets if params.bind else ():
                 if armature.find(obj) is None:
-                    armature.bind(obj, rig)
+                    attaching.bind(obj, rig)
+                warnings += [
+                    f"{obj.name} {phrase}: end that if {rig.name} alone is to move it"
+                    for phrase in followers.phrases(obj, rig, ())
+                ]
             return EmbedReport(rig.name, meshes, confidence, outside, embedding.report["seconds"], warnings)
     except BaseException:
         embedded.remove(rig)

@@ -12,7 +12,7 @@ import time
 import bpy
 
 from .. import jobs, native
-from ..scene import armature, brush, changes, mask, vertex_groups, weight_state
+from ..scene import armature, attaching, brush, changes, mask, vertex_groups, weight_state
 from ..scene.error import SceneError
 from ..transfer.compute import Result
 from ..transfer.params import TransferParams
@@ -71,7 +71,7 @@ class MaskPainting:
         source = bpy.data.objects.get(self.source)
         if source and armature.find(source) and armature.find(target) is None:
             # Else the artist would see no weight at work.
-            self._modifiers = armature.attach(target, source)
+            self._modifiers = attaching.attach(target, source)
 
     @property
     def armature_added(self) -> bool:
@@ -102,7 +102,7 @@ class MaskPainting:
             self._asked = asked
             self._start(params, near=True)
             if self._runner:
-                self._runner.wait(PATIENCE_SECONDS, look=0.002)
+                self._runner.wait(PATIENCE_SECONDS)
         elif self.unsettled and self._runner is None and time.perf_counter() > self.written_at[-1] + REST_SECONDS:
             self._start(self.unsettled, near=False)
             self._settling = self._runner is not None

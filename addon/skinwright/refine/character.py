@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .. import csr, native
 from ..csr import Rows
-from ..scene import armature, mesh, mirror, shapes, vertex_groups
+from ..scene import armature, mesh, mirror, orientation, shapes, vertex_groups
 from ..scene.error import SceneError
 from .params import RefineParams
 
@@ -81,7 +81,7 @@ def read(obj: bpy.types.Object) -> Character:
         name=obj.name,
         rig=rig.name,
         positions=positions,
-        triangles=_outward(positions, mesh.triangles(obj)),
+        triangles=orientation.outward(positions, mesh.triangles(obj)),
         rows=csr.Rows(*rows),
         bones=bones,
         parents=armature.parents(rig, bones),
@@ -90,13 +90,6 @@ def read(obj: bpy.types.Object) -> Character:
         preserve_volume=preserves_volume(obj),
         armature_from_mesh=np.linalg.inv(object_from_armature),
     )
-
-
-def _outward(positions: NDArray[np.float32], triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """The triangles (T, 3), all turned over if the mesh is inside out: flesh is what it encloses."""
-    a, b, c = (positions[triangles] - positions.mean(axis=0)).astype(np.float64).transpose(1, 0, 2)
-    volume = np.einsum("ti,ti->", a, np.cross(b, c))
-    return np.ascontiguousarray(triangles[:, ::-1]) if volume < 0 else triangles
 
 
 def _moved(matrix: NDArray[np.float64], positions: NDArray[np.float32]) -> NDArray[np.float32]:

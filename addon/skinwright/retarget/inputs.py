@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, editable, landmarks, rest_bones, vertex_groups
+from ..scene import armature, editable, evaluation, landmarks, rest_bones, vertex_groups
 from ..scene.error import SceneError
 from ..scene.rest_bones import RestBones
 from ..transfer import merging
@@ -21,12 +21,16 @@ from .whole import Whole
 
 @dataclass(frozen=True)
 class Character:
-    """An armature, its deforming bones, and meshes end to end: the k-th has vertices starts[k] to starts[k + 1]."""
+    """An armature, its deforming bones, and meshes end to end: the k-th has vertices starts[k] to starts[k + 1].
+
+    `left_out` are meshes on the armature that take no part, as they are hidden.
+    """
 
     armature: bpy.types.Object
     bones: RestBones
     meshes: list[bpy.types.Object]
     whole: Whole
+    left_out: list[bpy.types.Object]
 
     @property
     def positions(self) -> NDArray[np.float32]:
@@ -112,7 +116,7 @@ def _source(context: bpy.types.Context, source: bpy.types.Object) -> Character:
     meshes = [obj for obj in rest_bones.meshes(rig, context.scene) if obj.vertex_groups and obj.data.edges]
     if not meshes:
         raise SceneError(f"{rig.name} deforms no mesh that has weights: pick the armature of a skinned character")
-    return _character(rig, meshes)
+    return _character(rig, *rest_bones.visible(meshes, source))
 
 
 def by_character(
@@ -130,8 +134,11 @@ def by_character(
     return list(characters.items())
 
 
-def _character(rig: bpy.types.Object, meshes: list[bpy.types.Object]) -> Character:
-    return Character(rig, rest_bones_of(rig), meshes, whole.read(meshes, rig))
+def _character(
+    rig: bpy.types.Object, meshes: list[bpy.types.Object], left_out: Sequence[bpy.types.Object] = ()
+) -> Character:
+    evaluation.bring_up_to_date([rig, *meshes])
+    return Character(rig, rest_bones_of(rig), meshes, whole.read(meshes, rig), list(left_out))
 
 
 def joined_rows(meshes: Sequence[bpy.types.Object], names: Sequence[str]) -> Rows:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import mirror, shapes, sides
+from ..scene import mirror, orientation, shapes, sides
 from ..transfer import completion
 
 
@@ -58,7 +58,7 @@ def read(meshes: Sequence[bpy.types.Object], *rigs: bpy.types.Object) -> Whole:
     positions = [part.geometry.positions[: part.n_own] for part in parts]
     positions += [part.geometry.positions[part.n_own :] for part in parts]
     joined = [np.concatenate(each) for each in (positions, triangles, origin, flipped)]
-    return Whole(joined[0], joined[1], starts, joined[2], joined[3])
+    return Whole(joined[0], orientation.outward(joined[0], joined[1]), starts, joined[2], joined[3])
 
 
 def _completed(obj: bpy.types.Object, shape: shapes.Shape) -> completion.Completion:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import csr
-from ..scene import attributes, editable, object_state, vertex_groups
+from ..scene import attributes, editable, followers, mirror, object_state, rest_bones, sides, vertex_groups
+from ..transfer import strangers
 from .compute import Result
 from .inputs import Character, Pair
 from .params import RetargetParams
@@ -56,7 +57,13 @@ def _write_mesh(
     written = ~held & (used | np.array([name in present for name in names], bool))
     kept = [name for name, is_written in zip(names, written, strict=True) if is_written]
     vertex_groups.write(obj, kept, csr.take_columns(rows, written), vertices)
-    warnings = [editable.changes_others(obj)]
+    rig, shape = pair.target.armature, pair.target.positions[mine]
+    known = sides.opposites(rig, names)
+    warnings = [editable.changes_others(obj), mirror.warning(obj, np.array(obj.matrix_world), shape, rig, known)]
+    warnings += [
+        f"{obj.name} {phrase}: end that if the weights alone are to move it"
+        for phrase in followers.phrases(obj, rig, kept)
+    ]
     short = csr.row_sums(vertex_groups.read(obj, names))[vertices] < 1 - 1e-3 if held.any() else np.zeros(0, bool)
     if short.any():
         locked = _listed([name for name, is_held in zip(names, held, strict=True) if is_held])
@@ -68,7 +75,10 @@ def _write_mesh(
 
 
 def _warnings(pair: Pair, result: Result) -> list[str]:
-    warnings = []
+    warnings = [rest_bones.left_out_of(pair.source.armature, pair.source.left_out)] if pair.source.left_out else []
+    for one in (pair.source, pair.target):
+        warnings += [text for text in [rest_bones.misfit(one.armature, one.bones, one.positions)] if text]
+    warnings += strangers.warnings(pair.source.meshes, [pair.source.armature], pair.source.bones.names)
     alone = [entry.target for entry in pair.matches if not entry.source]
     if alone:
         warnings.append(f"Bones of {pair.target.armature.name} without a partner get no weight: {_listed(alone)}")

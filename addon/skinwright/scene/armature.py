@@ -133,45 +133,6 @@ def follows_any(obj: bpy.types.Object, rigs: Sequence[bpy.types.Object]) -> bool
     return bool(deforming) or (obj.parent_type == "ARMATURE" and find(obj) == obj.parent)
 
 
-def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
-    """Let the armatures that deform `source` deform `obj`: by modifiers of the same settings.
-
-    They come after mirroring, which needs the rest shape, and before all that builds on the pose. Returns their names.
-    """
-    place = _place_of_first(obj)
-    models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
-    added = []
-    for rig in [m.object for m in models] or [find(source)]:
-        added.append(_add_modifier(obj, rig, place))
-        place += 1
-    for modifier, model in zip(added, models, strict=False):
-        for name in BINDING:
-            setattr(modifier, name, getattr(model, name))
-    return [modifier.name for modifier in added]
-
-
-def bind(obj: bpy.types.Object, rig: bpy.types.Object, *, make_parent: bool = False) -> None:
-    """Let armature `rig` deform `obj`, after mirroring; and carry it along if it has no parent and `make_parent`."""
-    _add_modifier(obj, rig, _place_of_first(obj))
-    if make_parent and obj.parent is None:
-        obj.parent = rig
-        obj.matrix_parent_inverse = rig.matrix_world.inverted_safe()
-
-
-def _place_of_first(obj: bpy.types.Object) -> int:
-    """Where in the stack an armature belongs."""
-    mirrors = [index for index, other in enumerate(obj.modifiers) if other.type == "MIRROR"]
-    return mirrors[-1] + 1 if mirrors else 0
-
-
-def _add_modifier(obj: bpy.types.Object, rig: bpy.types.Object, place: int) -> bpy.types.ArmatureModifier:
-    name = obj.modifiers.new(rig.name, "ARMATURE").name
-    obj.modifiers.move(len(obj.modifiers) - 1, place)
-    modifier = obj.modifiers[name]  # moving exchanges what the modifiers point to
-    modifier.object = rig
-    return modifier
-
-
 def pose_from_rest(obj: bpy.types.Object, armature: bpy.types.Object, bones: Sequence[str]) -> NDArray[np.float64]:
     """(B, 4, 4) where each bone takes a point of the mesh, in the mesh's own space.
 

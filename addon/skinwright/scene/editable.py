@@ -43,3 +43,9 @@ def changes_others(obj: bpy.types.Object) -> str:
     """The warning that weights written to `obj` are those of other objects too, or nothing."""
     others = mesh.other_users(obj)
     return f"{obj.name} shares its mesh with {', '.join(others)}, whose weights changed too" if others else ""
+
+
+def collection(context: bpy.types.Context) -> bpy.types.Collection:
+    """Where new objects go: the active collection, or the scene's where that is of a library and takes nothing in."""
+    active = context.collection
+    return active if active.is_editable and not active.override_library else context.scene.collection

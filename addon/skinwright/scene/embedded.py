@@ -7,6 +7,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 from numpy.typing import NDArray
 
+from . import editable
 from .rest_bones import RestBones
 
 CONFIDENCE = "skinwright_confidence"
@@ -27,7 +28,7 @@ def create(
     data.name = name
     rig = bpy.data.objects.new(name, data)
     try:
-        context.collection.objects.link(rig)
+        editable.collection(context).objects.link(rig)
         _shape(context, rig, bones, places)
     except BaseException:
         remove(rig)

@@ -72,6 +72,16 @@ def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32] | None:
     return _attribute(mesh, ".corner_vert", len(mesh.loops))
 
 
+def around(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """(F,) where the corners of each face start, and two sums over its vertices that tell faces of others apart."""
+    start = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", start)
+    vertices = stored(mesh, ".corner_vert", mesh.loops, "vertex_index").astype(np.int64)
+    if not start.size:
+        return start, vertices, vertices
+    return start, np.add.reduceat(vertices, start), np.add.reduceat(vertices**2, start)
+
+
 def stored(
     mesh: bpy.types.Mesh, name: str, elements: bpy.types.bpy_prop_collection, property_name: str, size: int = 1
 ) -> NDArray[np.int32]:

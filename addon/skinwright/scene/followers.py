@@ -9,10 +9,8 @@ import numpy as np
 from mathutils import Matrix
 
 from .. import csr
-from . import armature, carried, modifier_inputs, modifiers, shapes, vertex_groups
+from . import armature, attaching, carried, modifiers, shapes, stack, vertex_groups
 
-# Modifiers that take the shape of other objects; all others look at their places at most.
-_FOLLOWS_A_SHAPE = {"BOOLEAN", "CURVE", "LATTICE", "MESH_DEFORM", "NODES", "SHRINKWRAP", "SURFACE_DEFORM"}
 # Nodes store weights as they are.
 _SAME_WEIGHT = 1e-4
 
@@ -25,6 +23,16 @@ class Follower:
     end: Callable[[], None]
 
 
+@dataclass(frozen=True)
+class _Binding:
+    """How weights are to act: in armatures `rigs`, as in the modifiers `models` of a source, `as_child` if as a child
+    of one too."""
+
+    rigs: list[bpy.types.Object]
+    models: list[bpy.types.ArmatureModifier]
+    as_child: bool
+
+
 def others(
     obj: bpy.types.Object, sources: list[bpy.types.Object], groups: Iterable[str], world: Matrix
 ) -> list[Follower]:
@@ -32,14 +40,30 @@ def others(
 
     `world` is where the object is to stay once a parent or constraint lets it go.
     """
+    model = sources[0]
+    binding = _Binding(armature.rigs(model), armature.modifiers(model), model.parent_type == "ARMATURE")
+    return _others(obj, sources, binding, set(groups), world)
+
+
+def phrases(obj: bpy.types.Object, rig: bpy.types.Object, groups: Iterable[str]) -> list[str]:
+    """What beside weights in `groups`, for the bones of `rig`, moves `obj`; or writes these groups."""
+    found = _others(obj, [obj], _Binding([rig], [], as_child=False), set(groups), obj.matrix_world.copy())
+    return [follower.phrase for follower in found]
+
+
+def _others(
+    obj: bpy.types.Object, sources: list[bpy.types.Object], binding: _Binding, groups: set[str], world: Matrix
+) -> list[Follower]:
     return [
         *_parents(obj, sources, world),
         *_constraints(obj, sources, world),
         *_drivers(obj, sources, world),
-        *_armatures(obj, sources),
-        *_switched_off(obj, sources),
+        *_armatures(obj, binding),
+        *_switched_off(obj, binding),
         *_surfaces(obj, sources),
-        *_overruled(obj, set(groups)),
+        *_caches(obj),
+        *shaping(obj, sources),
+        *_overruled(obj, groups),
     ]
 
 
@@ -79,12 +103,11 @@ def _mute(obj: bpy.types.Object, follows: bpy.types.Constraint | bpy.types.FCurv
     obj.matrix_world = world
 
 
-def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+def _armatures(obj: bpy.types.Object, binding: _Binding) -> list[Follower]:
     """Armature modifiers that are not bound as the source is; ending one removes it."""
-    models = [model for model in armature.modifiers(sources[0]) if model.show_viewport]
+    models, rigs = [model for model in binding.models if model.show_viewport], binding.rigs
     found: list[tuple[tuple, tuple[str, bpy.types.ArmatureModifier]]] = []
     seen = [(model.object, _binding(model)) for model in models]
-    rigs = armature.rigs(sources[0])
     for modifier in armature.modifiers(obj):
         if not modifier.show_viewport and (modifier.object in rigs or not modifier.show_render):
             continue  # told by _switched_off, or it does nothing
@@ -101,20 +124,19 @@ def _armatures(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[F
         phrase = f"is deformed as a child of {parent.name} and not by {rigs[0].name}"
         listed.append(Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT")))
     by_modifier = [rig for (rig, _), (phrase, _) in found if not phrase]
-    if obj.parent_type == "ARMATURE" and obj.parent in by_modifier and sources[0].parent_type != "ARMATURE":
+    if obj.parent_type == "ARMATURE" and obj.parent in by_modifier and not binding.as_child:
         phrase = f"is deformed by {obj.parent.name} twice, by a modifier and as its child"
         listed.append(Follower(phrase, partial(setattr, obj, "parent_type", "OBJECT")))
     return listed
 
 
-def _switched_off(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+def _switched_off(obj: bpy.types.Object, binding: _Binding) -> list[Follower]:
     """Armature modifiers that are off where the source's are on; ending one turns it on."""
-    models = armature.modifiers(sources[0])
     found = []
     for modifier in armature.modifiers(obj):
         for name, where in (("show_viewport", "the viewport"), ("show_render", "renders")):
-            on = [model for model in models if getattr(model, name) and model.object == modifier.object]
-            if on and not getattr(modifier, name):
+            on = [model.object for model in binding.models if getattr(model, name)] if binding.models else binding.rigs
+            if modifier.object in on and not getattr(modifier, name):
                 phrase = f"has the modifier {modifier.name}, which is off in {where}"
                 found.append(Follower(phrase, partial(_switch_on, modifier)))
                 break
@@ -158,20 +180,38 @@ def _surfaces(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Fo
     """Modifiers that carry the mesh along with what a pose moves: the source's surface, bones, what hangs on them."""
     found = []
     for modifier in modifiers.used(obj):
-        followed = [other for other in modifier_inputs.objects(modifier) if _moves(other, modifier, sources)]
+        followed = stack.follows_pose(modifier, sources)
         if followed and modifier.type != "ARMATURE" and modifiers.moves(modifier):
             phrase = f"has the modifier {modifier.name}, which follows {followed[0].name} too"
             found.append(Follower(phrase, partial(_hide, modifier)))
     return found
 
 
-def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: list[bpy.types.Object]) -> bool:
-    """Whether a pose changes what the modifier sees of the object."""
-    if other.type == "ARMATURE":
-        return modifier_inputs.names_a_bone(modifier)
-    if carried.is_carried(other, sources):
-        return True
-    return modifier.type in _FOLLOWS_A_SHAPE and carried.is_deformed(other, sources)
+def _caches(obj: bpy.types.Object) -> list[Follower]:
+    """Modifiers that put the vertices where a file says, whatever the weights say."""
+    playing = [m for m in modifiers.used(obj) if modifiers.plays_a_file(m)]
+    return [Follower(f"has the modifier {m.name}, which plays a cache", partial(_hide, m)) for m in playing]
+
+
+def shaping(obj: bpy.types.Object, sources: list[bpy.types.Object]) -> list[Follower]:
+    """Modifiers after the armature that shape its pose as they should shape the mesh at rest."""
+    return [
+        Follower(
+            f"has the modifier {modifier.name} after its armature, so that it shapes the pose and not the mesh at rest",
+            partial(_lift, obj, modifier.name),
+        )
+        for modifier in stack.shaping_the_pose(obj, sources)
+    ]
+
+
+def _lift(obj: bpy.types.Object, name: str) -> None:
+    """Put the armature below this modifier, or the modifier above the armature."""
+    first = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE" and m.object), None)
+    if first is not None and first < obj.modifiers.find(name):
+        stack.move(obj, name, first)
+    if armature.deforms_as_parent(obj) and obj.parent.type == "ARMATURE":
+        attaching.bind(obj, obj.parent)
+        obj.parent_type = "OBJECT"
 
 
 def _overruled(obj: bpy.types.Object, groups: set[str]) -> list[Follower]:

@@ -5,6 +5,8 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from . import editable
+
 # Marks the empties that were made as landmarks.
 _MADE = "skinwright_landmark"
 
@@ -24,7 +26,7 @@ def add_empty(context: bpy.types.Context, name: str, place: Vector, size: float)
     empty.show_in_front, empty.show_name = True, True
     empty.location = place
     empty[_MADE] = True
-    context.collection.objects.link(empty)
+    editable.collection(context).objects.link(empty)
     empty.select_set(True)
     return empty
 

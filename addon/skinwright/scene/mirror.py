@@ -33,6 +33,41 @@ def after_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
     return [m for m in _of_the_pose(obj) if m.show_viewport or m.show_render]
 
 
+def warning(
+    obj: bpy.types.Object,
+    matrix: NDArray[np.float64],
+    positions: NDArray[np.float32],
+    rig: bpy.types.Object | None,
+    opposite: dict[str, str],
+) -> str:
+    """Why a half that a Mirror modifier adds will not follow the bones of its side, or nothing.
+
+    Half a mesh gets the other half's weights by the groups' names.
+    """
+    posed = after_the_pose(obj)
+    if posed:
+        return (
+            f"The modifier {posed[0].name} of {obj.name} comes after the armature, so that the half it makes mirrors "
+            "the pose of the other: move it above the Armature modifier and try again"
+        )
+    wrong = [found for found in reflections(obj, matrix, positions) if not is_right(found, rig, opposite)]
+    if not wrong:
+        return ""
+    named = wrong[0].name
+    if not wrong[0].flips:
+        return f"Vertex Groups is off in the modifier {named} of {obj.name}: both sides will follow the bones of one"
+    if sides.exchanged(rig, opposite, wrong[0].world) is False:
+        return (
+            f"The modifier {named} of {obj.name} exchanges left and right in a copy that lies on the same side: "
+            "apply it and try again"
+        )
+    name = sides.unflippable(opposite)
+    return (
+        f"The modifier {named} of {obj.name} cannot tell that {opposite[name]} mirrors {name}, "
+        "so both sides will follow the bones of one: apply it and try again, or rename the bones"
+    )
+
+
 def _of_the_pose(obj: bpy.types.Object) -> list[bpy.types.MirrorModifier]:
     """Those after the first armature. One that deforms as a parent comes before all modifiers."""
     is_posed = armature.deforms_as_parent(obj) and obj.parent.type == "ARMATURE"

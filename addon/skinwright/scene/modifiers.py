@@ -84,6 +84,13 @@ def moves(modifier: bpy.types.Modifier) -> bool:
     return modifier.type not in _MOVES_NOTHING | {"ARMATURE"}
 
 
+def plays_a_file(modifier: bpy.types.Modifier) -> bool:
+    """Whether it takes the shape from a cache on disk."""
+    if modifier.type == "MESH_CACHE":
+        return bool(modifier.filepath) and modifier.factor > 0
+    return modifier.type == "MESH_SEQUENCE_CACHE" and modifier.cache_file is not None
+
+
 def transfers_weights(modifier: bpy.types.Modifier) -> bool:
     """Whether it is a Data Transfer that writes vertex groups."""
     if modifier.type != "DATA_TRANSFER" or not modifier.use_vert_data:

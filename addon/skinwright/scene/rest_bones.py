@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from . import armature, mesh
 
+# How far from its meshes' box a bone may lie, as a part of the box's diagonal.
+_MARGIN = 0.2
+
 
 @dataclass(frozen=True)
 class RestBones:
@@ -46,3 +49,33 @@ def meshes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Obje
     """The scene's meshes that an armature deforms, by name."""
     found = [obj for obj in scene.objects if obj.type == "MESH" and armature.find(obj) == rig]
     return sorted(found, key=lambda obj: obj.name)
+
+
+def visible(
+    meshes: Sequence[bpy.types.Object], picked: bpy.types.Object
+) -> tuple[list[bpy.types.Object], list[bpy.types.Object]]:
+    """Those of a character's meshes that can be seen or were picked, and the others: levels of detail, collision hulls,
+    older versions. If none can be seen, all count."""
+    seen = [obj for obj in meshes if obj.visible_get() or obj == picked]
+    return (seen, [obj for obj in meshes if obj not in seen]) if seen else (list(meshes), [])
+
+
+def left_out_of(rig: bpy.types.Object, meshes: Sequence[bpy.types.Object]) -> str:
+    """What to say of hidden meshes that took no part."""
+    names = ", ".join(obj.name for obj in meshes[:8]) + (", ..." if len(meshes) > 8 else "")
+    return f"Hidden meshes on {rig.name} took no part in its shape and weights: {names}; show those that should"
+
+
+def misfit(rig: bpy.types.Object, bones: RestBones, positions: NDArray[np.float32]) -> str:
+    """A sentence where most bones lie outside of the box around their meshes' points (V, 3): one of both was scaled or
+    moved without the other."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    margin = _MARGIN * float(np.linalg.norm(high - low))
+    middles = (bones.heads + bones.tails) / 2
+    outside = ((middles < low - margin) | (middles > high + margin)).any(axis=1)
+    if outside.mean() <= 0.5:
+        return ""
+    return (
+        f"{int(outside.sum())} of {len(outside)} bones of {rig.name} lie far from the meshes on it: are scale and "
+        "place of both as they should be?"
+    )

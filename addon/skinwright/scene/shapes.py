@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from . import armature, mesh, modifiers, places, poses, vertex_groups
+from . import armature, faces, mesh, modifiers, places, poses, vertex_groups
 from .error import SceneError
 
 # REST is the mesh alone (with shape keys its Basis); AS_SHOWN adds shape keys in use and modifiers, but no pose;
@@ -39,17 +39,40 @@ def looked_at(objects: list[bpy.types.Object], look: Look) -> Iterator[None]:
 
 
 def read_source(obj: bpy.types.Object, look: Look, names: list[str]) -> tuple[Shape, Rows]:
-    """Shape and weights in the groups `names`, of the vertices that all its modifiers leave; inside `looked_at`."""
+    """Shape and weights in the groups `names`, of the vertices that all its modifiers leave; inside `looked_at`.
+
+    Modifiers that leave no faces, or lose the weights, are left out and named as unseen.
+    """
     if look == "REST" or not _is_shaped(obj, look):
         return _plain(obj), vertex_groups.read(obj, names)
-    with (
-        _evaluable(obj) as shown,
-        _without(_reweighting_after_the_pose(shown)),
-        _evaluated_mesh(shown) as (evaluated, seen),
-    ):
-        geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
+    with _evaluable(obj) as shown, _without(_reweighting_after_the_pose(shown)):
+        making = [m for m in modifiers.shown(shown) if not modifiers.keeps_vertices(m) and m.type != "MASK"]
+        for off in ([], *([modifier] for modifier in reversed(making))):
+            found = _evaluated_source(obj, shown, off, names)
+            if not making or _is_sound(obj, found, names):
+                return found
+        return _evaluated_source(obj, shown, making, names)
+
+
+def _evaluated_source(
+    obj: bpy.types.Object, shown: bpy.types.Object, off: list[bpy.types.Modifier], names: list[str]
+) -> tuple[Shape, Rows]:
+    """Without the modifiers `off`. Without any it may have no faces, which is no error yet."""
+    with _without(off), _evaluated_mesh(shown) as (evaluated, seen):
         rows = vertex_groups.read_evaluated(evaluated, seen, names)
-        return Shape(geometry, np.array(shown.matrix_world), []), rows
+        if len(obj.data.polygons) and not len(seen.polygons):
+            nothing = mesh.Geometry(np.empty((0, 3), np.float32), *(np.empty((0, n), np.uint32) for n in (3, 2)))
+            return Shape(nothing, np.array(shown.matrix_world), []), rows
+        geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
+        return Shape(geometry, np.array(shown.matrix_world), [modifier.name for modifier in off]), rows
+
+
+def _is_sound(obj: bpy.types.Object, found: tuple[Shape, Rows], names: list[str]) -> bool:
+    """Whether it has faces, and weights, if the mesh itself has."""
+    shape, rows = found
+    if len(obj.data.polygons) and not len(shape.geometry.triangles):
+        return False
+    return bool((rows.values > 0).any()) or not (vertex_groups.read(obj, names).values > 0).any()
 
 
 @contextmanager
@@ -126,6 +149,18 @@ def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: li
         return vertex_groups.read_evaluated(evaluated, seen, names)
 
 
+def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
+    """Whether this modifier moves the mesh's own vertices, by more than rounding; Geometry Nodes may make others."""
+    place = list(obj.modifiers).index(modifier)
+    with looked_at([obj], "AS_SHOWN"), _evaluable(obj) as shown:
+        others = [m for m in list(shown.modifiers)[:place] if not modifiers.keeps_vertices(m)]
+        others += list(shown.modifiers)[place + 1 :]
+        before, after = _positions_without(shown, [*others, shown.modifiers[place]]), _positions_without(shown, others)
+    if before.shape != after.shape or not before.size:
+        return False
+    return float(np.abs(after - before).max()) > 1e-5 * float(np.ptp(before, axis=0).max())
+
+
 def _plain(obj: bpy.types.Object) -> Shape:
     return Shape(mesh.read(obj), np.array(obj.matrix_world), [])
 
@@ -160,12 +195,21 @@ def _kept_positions(obj: bpy.types.Object, look: Look) -> tuple[NDArray[np.float
         off += [m for m in modifiers.shown(obj) if m.type in ("CLOTH", "SOFT_BODY")]
     nodes = [m for m in modifiers.shown(obj) if m.type == "NODES"]
     local = _positions_without(obj, off)
-    if len(local) != len(obj.data.vertices) and nodes:
+    if nodes and not _keeps_its_faces(obj, off):
         off += nodes
         local = _positions_without(obj, off)
     if len(local) != len(obj.data.vertices):
         raise SceneError(f"{obj.name} has another number of vertices when evaluated: set Geometry to Rest")
     return local, [m.name for m in off if modifiers.hides_shape(m) or modifiers.keeps_vertices(m)]
+
+
+def _keeps_its_faces(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> bool:
+    """Whether without these modifiers each face has the vertices that it has in the mesh; it may be turned over."""
+    with _without(off):
+        seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        if len(seen.vertices) != len(obj.data.vertices):
+            return False
+        return all(map(np.array_equal, faces.around(seen), faces.around(obj.data)))
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:

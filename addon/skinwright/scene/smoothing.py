@@ -2,6 +2,8 @@
 
 import bpy
 
+from . import stack
+
 _SETTINGS = ("factor", "iterations", "scale", "smooth_type", "use_only_smooth", "use_pin_boundary")
 
 
@@ -19,7 +21,9 @@ def copy(obj: bpy.types.Object, model: bpy.types.CorrectiveSmoothModifier) -> No
     """Give `obj` a Corrective Smooth of the same settings right after its armatures, with its own rest shape."""
     armatures = [index for index, modifier in enumerate(obj.modifiers) if modifier.type == "ARMATURE"]
     modifier = obj.modifiers.new(model.name, "CORRECTIVE_SMOOTH")
-    obj.modifiers.move(len(obj.modifiers) - 1, armatures[-1] + 1 if armatures else 0)
+    name = modifier.name
+    stack.move(obj, name, armatures[-1] + 1 if armatures else 0)
+    modifier = obj.modifiers[name]  # moving exchanges what the modifiers point to
     modifier.rest_source = "ORCO"
     for name in _SETTINGS:
         setattr(modifier, name, getattr(model, name))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import bpy
@@ -21,15 +22,20 @@ _LARGEST_TABLE = 1 << 24
 
 @dataclass(frozen=True)
 class Memberships:
-    """Of some vertices, in stored order: row among them, group index and weight of each.
+    """Of some vertices, in stored order: those of row r begin at indptr[r]; group index and weight of each.
 
     `array` is Blender's own memory, where that can be reached: valid until Blender next touches the mesh.
     """
 
-    row: NDArray[np.int64]
-    group: NDArray[np.int64]
+    indptr: NDArray[np.int64]
+    group: NDArray[np.uint32]
     values: NDArray[np.float32]
     array: deform_array.DeformArray | None = None
+
+    @cached_property
+    def row(self) -> NDArray[np.int64]:
+        """(nnz,) the row of each."""
+        return np.repeat(np.arange(len(self.indptr) - 1, dtype=np.int64), np.diff(self.indptr))
 
 
 def activate(obj: bpy.types.Object, name: str) -> None:
@@ -109,34 +115,35 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     row does not hold are removed; other groups, other vertices and the locks stay. Values are stored bit for bit.
     """
     soundness.check(obj.name, rows)
-    owned = np.array([group.index for group in ensure(obj, names)], np.int64)
+    owned = np.array([group.index for group in ensure(obj, names)], np.uint32)
     mesh = obj.data
     indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
-    row, group = np.repeat(np.arange(len(indices), dtype=np.int64), np.diff(rows.indptr)), owned[rows.bones]
-    held = _memberships(mesh, indices)
-    if not _are_members(held, row, group) and _change_members(obj, indices, held, owned, row, group):
+    held, wanted = (
+        _memberships(mesh, indices),
+        Memberships(rows.indptr.astype(np.int64), owned[rows.bones], rows.values),
+    )
+    if not _are_members(held, wanted) and _change_members(obj, indices, held, owned, wanted):
         held = _memberships(mesh, indices)
-    _set_weights(mesh, indices, held, row, group, rows.values)
+    _set_weights(mesh, indices, held, wanted)
     mesh.update()
 
 
-def _are_members(held: Memberships, row: NDArray[np.int64], group: NDArray[np.int64]) -> bool:
+def _are_members(held: Memberships, wanted: Memberships) -> bool:
     """Whether memberships are those that are there already, without others: as after a first transfer."""
-    return np.array_equal(held.row, row) and np.array_equal(held.group, group)
+    return np.array_equal(held.indptr, wanted.indptr) and np.array_equal(held.group, wanted.group)
 
 
 def _change_members(
     obj: bpy.types.Object,
     indices: NDArray[np.integer],
     held: Memberships,
-    owned: NDArray[np.int64],
-    row: NDArray[np.int64],
-    group: NDArray[np.int64],
+    owned: NDArray[np.uint32],
+    wanted: Memberships,
 ) -> bool:
-    """Give the vertices the memberships (row, group) in place of those in the groups `owned`; whether any differed."""
+    """Give the vertices the memberships `wanted` in place of those in the groups `owned`; whether any differed."""
     is_owned = np.zeros(max(int(held.group.max(initial=0)), int(owned.max(initial=0))) + 1, bool)
     is_owned[owned] = True
-    mine = is_owned[held.group]
+    mine, row, group = is_owned[held.group], wanted.row, wanted.group
     held_row, held_group = held.row[mine], held.group[mine]
     missing = _positions((held_row, held_group), (row, group), len(indices)) < 0
     stale = _positions((row, group), (held_row, held_group), len(indices)) < 0
@@ -182,9 +189,7 @@ def _memberships(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Membersh
     array = deform_array.open_array(mesh, indices)
     if array is None:
         return _from_api(mesh, indices)
-    counts = np.diff(array.indptr)
-    row = np.repeat(np.arange(len(counts), dtype=np.int64), counts)
-    return Memberships(row, array.groups().astype(np.int64), array.weights(), array)
+    return Memberships(array.indptr, array.groups(), array.weights(), array)
 
 
 def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships:
@@ -197,36 +202,32 @@ def _from_api(mesh: bpy.types.Mesh, indices: NDArray[np.integer]) -> Memberships
         for member in members:
             groups.append(member.group)
             values.append(member.weight)
-    row = np.repeat(np.arange(len(indices), dtype=np.int64), np.array(counts, np.int64))
-    return Memberships(row, np.array(groups, np.int64), np.array(values, np.float32))
+    indptr = np.concatenate([[0], np.cumsum(np.array(counts, np.int64), dtype=np.int64)])
+    return Memberships(indptr, np.array(groups, np.uint32), np.array(values, np.float32))
 
 
 def _set_weights(
     mesh: bpy.types.Mesh,
     indices: NDArray[np.integer],
     held: Memberships,
-    row: NDArray[np.int64],
-    group: NDArray[np.int64],
-    values: NDArray[np.float32],
+    wanted: Memberships,
 ) -> None:
-    """Give memberships that exist already, (row in `indices`, group), their values."""
-    if _are_members(held, row, group):
-        now = values
+    """Give memberships that exist already their values."""
+    if _are_members(held, wanted):
+        now = wanted.values
     else:
-        position = _positions((row, group), (held.row, held.group), len(indices))
+        position = _positions((wanted.row, wanted.group), (held.row, held.group), len(indices))
         found = position >= 0
         now = held.values.copy()
-        now[found] = values[position[found]]
+        now[found] = wanted.values[position[found]]
     if held.array:
         held.array.set_weights(now)
         return
-    ends = np.cumsum(np.bincount(held.row, minlength=len(indices)), dtype=np.int64)
-    for r in np.unique(row).tolist():
-        start = ends[r - 1] if r else 0
-        mesh.vertices[indices[r]].groups.foreach_set("weight", now[start : ends[r]])
+    for r in np.unique(wanted.row).tolist():
+        mesh.vertices[indices[r]].groups.foreach_set("weight", now[held.indptr[r] : held.indptr[r + 1]])
 
 
-def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator[tuple[int, list[int]]]:
+def _by_group(vertex: NDArray[np.integer], group: NDArray[np.integer]) -> Iterator[tuple[int, list[int]]]:
     """Each group's index with its vertices."""
     # NumPy sorts 16 bits by digits, six times as fast.
     small = group.astype(np.uint16) if group.max(initial=0) < 1 << 16 else group
@@ -237,7 +238,7 @@ def _by_group(vertex: NDArray[np.integer], group: NDArray[np.int64]) -> Iterator
             yield int(ordered[start]), vertices[start:end].tolist()
 
 
-Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
+Pairs = tuple[NDArray[np.int64], NDArray[np.uint32]]
 
 
 def _positions(pairs: Pairs, wanted: Pairs, n_rows: int) -> NDArray[np.integer]:
@@ -254,7 +255,7 @@ def _positions(pairs: Pairs, wanted: Pairs, n_rows: int) -> NDArray[np.integer]:
     return table[wanted[0] * width + wanted[1]]
 
 
-def _keys(row: NDArray[np.int64], group: NDArray[np.int64]) -> NDArray[np.int64]:
+def _keys(row: NDArray[np.int64], group: NDArray[np.uint32]) -> NDArray[np.int64]:
     """One number per membership: 64 bits, whatever NumPy counts in. Blender has at most 2^31 groups."""
     return row.astype(np.int64) << 31 | group
 
@@ -267,7 +268,7 @@ def _find(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> tuple[NDAr
     return position, ordered[position] == keys
 
 
-def _lookup(groups: list[int], group: NDArray[np.int64]) -> NDArray[np.int64]:
+def _lookup(groups: list[int], group: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Position of each group index in `groups`, or -1. A mesh may hold indices beyond its object's list of groups."""
     beyond = max(groups, default=-1) + 1
     column = np.full(beyond + 2, -1, np.int64)

@@ -2,11 +2,14 @@
 
 import hashlib
 from dataclasses import dataclass
+from itertools import pairwise
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import csr
+from ..csr import Rows
 from .vertex_groups import Memberships, _by_group, _memberships, activate
 
 
@@ -36,18 +39,16 @@ def capture(obj: bpy.types.Object) -> WeightState:
     """The state of an object; not in Edit mode."""
     n = len(obj.data.vertices)
     held = _memberships(obj.data, np.arange(n, dtype=np.int64))
-    row, groups, values = held.row, held.group, held.values
-    known = groups < len(obj.vertex_groups)  # a mesh may hold indices beyond its object's list
-    if not known.all():
-        row, groups, values = row[known], groups[known], values[known]
-    counts = np.bincount(row, minlength=n)
+    rows = Rows(held.indptr.astype(np.uint32), held.group, held.values)
+    # A mesh may hold indices beyond its object's list.
+    known = csr.keep_entries(rows, held.group < len(obj.vertex_groups))
     return WeightState(
         names=[group.name for group in obj.vertex_groups],
         locked=[group.lock_weight for group in obj.vertex_groups],
         active=obj.vertex_groups.active.name if obj.vertex_groups.active else "",
-        indptr=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.uint32),
-        groups=groups.astype(np.uint32),
-        values=values,
+        indptr=known.indptr,
+        groups=known.bones,
+        values=known.values,
     )
 
 
@@ -85,13 +86,12 @@ def _set_all(mesh: bpy.types.Mesh, held: Memberships, values: NDArray[np.float32
     if held.array is not None:
         held.array.set_weights(values)
         return
-    ends = np.cumsum(np.bincount(held.row, minlength=len(mesh.vertices)), dtype=np.int64).tolist()
-    for vertex, start, end in zip(mesh.vertices, [0, *ends], ends, strict=False):
+    for vertex, (start, end) in zip(mesh.vertices, pairwise(held.indptr.tolist()), strict=True):
         vertex.groups.foreach_set("weight", values[start:end])
 
 
 def _vertices_with_other_members(
-    row: NDArray[np.int64], group: NDArray[np.int64], state: WeightState
+    row: NDArray[np.int64], group: NDArray[np.uint32], state: WeightState
 ) -> NDArray[np.bool_]:
     """(V,) those whose members or their order differ."""
     wanted = np.diff(state.indptr).astype(np.int64)

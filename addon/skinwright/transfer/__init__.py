@@ -10,6 +10,7 @@ from ..reporting import Report
 from ..scene import mesh, object_state
 from ..scene.error import SceneError
 from ..scene.watched import Watched
+from . import strangers
 from .checks import check_source, source_warnings, target_problem
 from .compute import Failure, compute
 from .inputs import Body, Garment, read_body, read_garment
@@ -54,7 +55,8 @@ def steps(
         plans, unbindable = _plan(body, [garment for garment in garments if garment.object.name in results], results)
         failures += unsolved + unbindable
         if failures and not (params.skip_failing and plans):
-            raise SceneError("; ".join(failure.sentence for failure in failures))
+            why = strangers.warnings(body.objects, body.rigs, body.bones) if unsolved else []
+            raise SceneError("; ".join([*(failure.sentence for failure in failures), *why]))
         for planned in plans:
             last_look(body, planned)
         written = [planned.garment.object for planned in plans]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import csr
 from ..csr import Rows
-from ..scene import armature, mesh, shapes, sides
+from ..scene import armature, evaluation, mesh, shapes, sides
 from ..scene.error import SceneError
 from . import parts
 from .params import TransferParams
@@ -22,7 +22,7 @@ class Body:
     `objects` are the meshes that are its body, the picked one first; `rigs` the armatures that deform it. The rows over
     `bones` sum to 1 and are carried over together. `fields` are groups beside them (cloth pins, masks), each carried
     over by itself. `chosen` names the groups to be written. `opposite` has the other side's bone of every bone.
-    `hidden` names what hides a part of the surface, and the points (n, 3) there.
+    `hidden` names what hides a part of the surface, and the points (n, 3) there; `unseen` what was left out.
     """
 
     object: bpy.types.Object
@@ -36,6 +36,7 @@ class Body:
     chosen: set[str]
     opposite: dict[str, str]
     hidden: tuple[str, NDArray[np.float32]] | None = None
+    unseen: str = ""
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -73,7 +74,9 @@ class Body:
 
 def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bpy.types.Object] | None = None) -> Body:
     """The source's shape and the weights of the groups that take part; `targets` are never part of it."""
+    evaluation.bring_up_to_date([source])  # which meshes continue it is told by their places
     objects = _body_objects(source, targets or [], params)
+    evaluation.bring_up_to_date(objects)
     rigs = _rigs(objects)
     bones, chosen = choose_groups(objects, rigs, params.groups)
     fields = [name for name in chosen if name not in bones]
@@ -99,7 +102,14 @@ def read_body(source: bpy.types.Object, params: TransferParams, targets: list[bp
         chosen=set(chosen),
         opposite=sides.opposites(rigs[0] if rigs else None, bones),
         hidden=next((each for each in hidden if each), None),
+        unseen=_unseen(objects, [shape for shape, _ in seen]),
     )
+
+
+def _unseen(objects: list[bpy.types.Object], seen: list[shapes.Shape]) -> str:
+    """The modifiers that were left out, in words, or nothing."""
+    left_out = [(obj.name, shape.unseen) for obj, shape in zip(objects, seen, strict=True) if shape.unseen]
+    return " and ".join(f"the modifier {', '.join(names)} of {name}" for name, names in left_out)
 
 
 def _split_columns(rows: Rows, n_left: int) -> tuple[Rows, Rows]:

@@ -5,8 +5,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import armature, editable, mesh, mirror, sides, vertex_groups
+from ..scene import armature, editable, mesh, mirror, sides, stack, vertex_groups
 from ..scene.error import SceneError
+from . import strangers
 from .inputs import Body, Garment
 from .params import TransferParams
 
@@ -42,7 +43,10 @@ def target_problem(
 
 def source_warnings(body: Body, native_report: dict[str, Any]) -> list[str]:
     """About the source, worth a look; the native report is that of any of its garments."""
-    found = [sentence for sentence in (_source_mirror(body), _envelopes(body)) if sentence]
+    found = [
+        sentence for sentence in (_left_out(body), _source_mirror(body), _shaped(body), _envelopes(body)) if sentence
+    ]
+    found += strangers.warnings(body.objects, body.rigs, body.bones)
     if body.bones and native_report["source_unnormalised"]:
         count = native_report["source_unnormalised"]
         found.append(f"{count} vertices of {body.name} have weights that do not sum to 1, and were normalised")
@@ -85,32 +89,8 @@ def _shear(body: Body, garment: Garment) -> str:
 
 
 def _mirror(body: Body, garment: Garment) -> str:
-    """Half a garment under a Mirror modifier gets the other half's weights by the groups' names."""
-    obj, shape = garment.object, garment.shape
-    posed = mirror.after_the_pose(obj)
-    if posed:
-        return (
-            f"The modifier {posed[0].name} of {obj.name} comes after the armature, so that the half it makes mirrors "
-            "the pose of the other: move it above the Armature modifier and transfer again"
-        )
-    found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
-    wrong = [reflection for reflection in found if not mirror.is_right(reflection, body.armature, body.opposite)]
-    if not wrong:
-        return ""
-    named = wrong[0].name
-    exchanged = sides.exchanged(body.armature, body.opposite, wrong[0].world)
-    if not wrong[0].flips:
-        return f"Vertex Groups is off in the modifier {named} of {obj.name}: both sides will follow the bones of one"
-    if exchanged is False:
-        return (
-            f"The modifier {named} of {obj.name} exchanges left and right in a copy that lies on the same side: "
-            "apply it and transfer again"
-        )
-    name = sides.unflippable(body.opposite)
-    return (
-        f"The modifier {named} of {obj.name} cannot tell that {body.opposite[name]} mirrors {name}, "
-        "so both sides will follow the bones of one: apply it and transfer again, or rename the bones"
-    )
+    shape = garment.shape
+    return mirror.warning(garment.object, shape.matrix, shape.geometry.positions, body.armature, body.opposite)
 
 
 def _envelopes(body: Body) -> str:
@@ -121,6 +101,28 @@ def _envelopes(body: Body) -> str:
             return (
                 f"{obj.name} {phrase}, which its weights do not tell, so garments will move otherwise: "
                 "bind it by Vertex Groups alone and transfer again"
+            )
+    return ""
+
+
+def _left_out(body: Body) -> str:
+    """Modifiers with which the body would have no surface, or none that has weights."""
+    if not body.unseen:
+        return ""
+    return (
+        f"With {body.unseen} there are no faces that have weights, so it was left out: apply it and weight what it "
+        "makes if that shape counts"
+    )
+
+
+def _shaped(body: Body) -> str:
+    """What shapes the body's pose by places that stay where they are moves no garment in the same way."""
+    for obj in body.objects:
+        found = stack.shaping_the_pose(obj, body.objects)
+        if found:
+            return (
+                f"The modifier {found[0].name} of {obj.name} comes after the armature and shapes its pose, which no "
+                "weights can follow: move it above the Armature modifier"
             )
     return ""
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..csr import Rows
-from ..scene import armature, binding, mask, mesh, mirror, modifiers, shapes, symmetry, vertex_groups
+from ..scene import armature, binding, evaluation, mask, mesh, mirror, modifiers, shapes, symmetry, vertex_groups
 from ..scene.error import SceneError
 from . import completion, merging
 from .body import Body, read_body
@@ -56,8 +56,9 @@ class Garment:
 def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -> Garment:
     """A target's shape, mask and locks; its old weights only where they take part in the new ones."""
     start = time.perf_counter()
+    evaluation.bring_up_to_date([target])
     locks = vertex_groups.locked(target)
-    own_bones = _bone_names(target, body) & {group.name for group in target.vertex_groups}
+    own_bones = _bone_names(target, body, params) & {group.name for group in target.vertex_groups}
     names = body.bones + sorted(own_bones - set(body.bones))
     partial = body.is_partial
     # Bones that the body lacks keep what they have, as locked ones do; where only some bones come, others make room.
@@ -126,8 +127,10 @@ def _opposite_columns(body: Body) -> NDArray[np.int64]:
     return np.array([index.get(body.opposite[name], index[name]) for name in body.bones], np.int64)
 
 
-def _bone_names(target: bpy.types.Object, body: Body) -> set[str]:
-    rigs = {*body.rigs, *armature.rigs(target)}
+def _bone_names(target: bpy.types.Object, body: Body, params: TransferParams) -> set[str]:
+    """Of the armatures that will deform the target: others of its own only if nothing ends them."""
+    others = [] if params.replace_others and body.rigs else armature.rigs(target)
+    rigs = {*body.rigs, *others}
     return set().union(*(armature.deform_bones(rig) for rig in rigs))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import csr
 from ..csr import Rows
 from ..reporting import GarmentReport
-from ..scene import armature, binding, followers, mesh, smoothing, vertex_groups
+from ..scene import armature, attaching, binding, followers, mesh, smoothing, vertex_groups
 from . import afterwards
 from .checks import garment_warnings
 from .compute import Result
@@ -53,11 +53,13 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
     names, rows = _needed_columns(result, csr.take_rows(result.rows, vertices), before)
     vertex_groups.write(target, names, rows, vertices)
     vertex_groups.ensure(target, sorted({body.opposite.get(name, name) for name in names} & set(body.bones)))
-    warnings += _let_weights_rule(body, garment, names, params)
+    found = followers.others(target, body.objects, names, Matrix(garment.shape.matrix))
+    warnings += _let_weights_rule(target, found, params)
     warnings += afterwards.warnings(body, garment, result)
     attached = params.add_armature and bool(body.rigs) and not armature.follows_any(target, body.rigs)
     if attached:
-        armature.attach(target, body.object)
+        attaching.attach(target, body.object)
+        warnings += _let_weights_rule(target, followers.shaping(target, body.objects), params)
     warnings += _smooth(body, target, params)
     bound = planned.undo is not None and bool(armature.rigs(target))
     if planned.undo is not None and bound:
@@ -66,10 +68,8 @@ def write(body: Body, planned: Plan, params: TransferParams) -> GarmentReport:
     return _report(planned, names, before, attached, bound, seconds, warnings)
 
 
-def _let_weights_rule(body: Body, garment: Garment, names: list[str], params: TransferParams) -> list[str]:
+def _let_weights_rule(target: bpy.types.Object, found: list[followers.Follower], params: TransferParams) -> list[str]:
     """End what else moves the target, or name it."""
-    target = garment.object
-    found = followers.others(target, body.objects, names, Matrix(garment.shape.matrix))
     if params.replace_others:
         for follower in found:
             follower.end()
