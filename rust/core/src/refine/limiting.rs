@@ -11,10 +11,11 @@ use super::solver::Frame;
 const IN_CONTACT: f32 = 0.04;
 
 impl Frame<'_> {
-    /// Bind, planes and membranes of every joint, for its skin.
+    /// Bind, planes and membranes of every joint.
     pub(super) fn limit(&mut self, axes: &[Axis], share: f32, passes: usize) {
         for (k, axis) in axes.iter().enumerate() {
             let limits = self.limits(k, axis, share);
+            self.local.limit_nodes(self.kernel, k, limits);
             self.local.limit_skin(self.kernel, k, limits);
             if let Some(plane) = self.plane(k, axis, share) {
                 if self.membranes[k].is_none() {
@@ -27,7 +28,7 @@ impl Frame<'_> {
         }
     }
 
-    /// Planes for the lattice, which follows its skin.
+    /// Planes alone, which the lattice may have left when it followed its skin.
     pub(super) fn separate(&mut self, axes: &[Axis], share: f32) {
         for (k, axis) in axes.iter().enumerate() {
             let limits = self.limits(k, axis, share);

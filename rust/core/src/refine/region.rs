@@ -8,7 +8,7 @@ use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
-use super::projection::{Batch, Blocks, Colouring, NODES};
+use super::projection::{Batch, Blocks, Colouring};
 
 const NONE: u32 = u32::MAX;
 /// Constraints that one task looks at.
@@ -54,13 +54,8 @@ pub(super) struct Region {
     pub(super) nodes: usize,
     /// Inverse masses: 1 where free, 0 where the skeleton decides.
     pub(super) masses: Vec<f32>,
-    /// Edges that octahedra do not keep, or not with all of their stiffness: lengths and shares.
-    pub(super) edges: Batch<2, 2>,
+    pub(super) edges: Batch<2, 1>,
     pub(super) sides: Batch<2, 1>,
-    pub(super) octahedra: Batch<NODES, 0>,
-    /// Tetrahedra of no octahedron.
-    pub(super) loose: Batch<4, 0>,
-    /// All tetrahedra.
     pub(super) tetrahedra: Batch<4, 0>,
     pub(super) hung: Vec<Hung>,
     /// The same by nodes: what hangs on each, counted from the first surface vertex, with its share.
@@ -112,8 +107,6 @@ struct Chosen {
     edges: Vec<u32>,
     sides: Vec<u32>,
     tetrahedra: Vec<u32>,
-    loose: Vec<u32>,
-    octahedra: Vec<u32>,
     triangles: Vec<u32>,
 }
 
@@ -127,11 +120,11 @@ impl Region {
         let map = |p: u32| local[p as usize];
         let surface = |i: u32| i + prepared.node_count() as u32;
         let (lattice, skin) = (Blocks::new(0, nodes), Blocks::new(nodes, global.len() - nodes));
-        let (corners, octahedra) = (&prepared.lattice.tetrahedra, &prepared.octahedra);
+        let (corners, edge_ends) = (&prepared.lattice.tetrahedra, &prepared.lattice.edges);
         let side_ends = &prepared.surface.edges;
         let edges = || {
-            let length = |k: u32| [prepared.edge_lengths[k as usize], octahedra.shares[k as usize]];
-            let ends = |k: u32| octahedra.edges[k as usize].map(map);
+            let length = |k: u32| [prepared.edge_lengths[k as usize]];
+            let ends = |k: u32| edge_ends[k as usize].map(map);
             Batch::new(lattice, &prepared.edge_colours, &chosen.edges, ends, length)
         };
         let sides = || {
@@ -143,17 +136,7 @@ impl Region {
             let ends = |k: u32| corners[k as usize].map(map);
             Batch::new(lattice, &prepared.tetrahedron_colours, &chosen.tetrahedra, ends, |_| [])
         };
-        let loose = || {
-            let ends = |k: u32| octahedra.loose[k as usize].map(map);
-            Batch::new(lattice, &prepared.loose_colours, &chosen.loose, ends, |_| [])
-        };
-        let octahedra = || {
-            let ends = |k: u32| octahedra.nodes[k as usize].map(map);
-            Batch::new(lattice, &prepared.octahedron_colours, &chosen.octahedra, ends, |_| [])
-        };
-        let (edges_and_sides, fours) = (|| rayon::join(edges, sides), || rayon::join(loose, tetrahedra));
-        let ((edges, sides), ((loose, tetrahedra), octahedra)) =
-            rayon::join(edges_and_sides, || rayon::join(fours, octahedra));
+        let ((edges, sides), tetrahedra) = rayon::join(|| rayon::join(edges, sides), tetrahedra);
 
         let hung = global[nodes..].iter().filter_map(|&p| {
             let embedding = prepared.lattice.embedding[p as usize - prepared.node_count()]?;
@@ -175,8 +158,6 @@ impl Region {
             masses: global.iter().map(|&p| f32::from(u8::from(is_free[p as usize]))).collect(),
             edges,
             sides,
-            octahedra,
-            loose,
             tetrahedra,
             hung,
             held_starts,
@@ -228,11 +209,9 @@ impl Chosen {
     fn new(prepared: &Prepared, is_free: &[bool]) -> Self {
         let surface = |i: u32| i + prepared.node_count() as u32;
         let any = |particles: &[u32]| particles.iter().any(|&p| is_free[p as usize]);
-        let (lattice, octahedra, skin) = (&prepared.lattice, &prepared.octahedra, &prepared.surface);
+        let (lattice, skin) = (&prepared.lattice, &prepared.surface);
         Self {
-            edges: kept(octahedra.edges.len(), |k| any(&octahedra.edges[k])),
-            octahedra: kept(octahedra.nodes.len(), |k| any(&octahedra.nodes[k])),
-            loose: kept(octahedra.loose.len(), |k| any(&octahedra.loose[k])),
+            edges: kept(lattice.edges.len(), |k| any(&lattice.edges[k])),
             sides: kept(skin.edges.len(), |k| any(&skin.edges[k].map(surface))),
             tetrahedra: kept(lattice.tetrahedra.len(), |k| any(&lattice.tetrahedra[k])),
             triangles: kept(skin.triangles.len(), |k| any(&skin.triangles[k].map(surface))),
@@ -245,8 +224,7 @@ impl Chosen {
         let surface = |i: u32| i as usize + nodes;
         let mut takes_part = is_free.to_vec();
         let mut mark = |p: usize| takes_part[p] = true;
-        self.octahedra.iter().flat_map(|&k| prepared.octahedra.nodes[k as usize]).for_each(|p| mark(p as usize));
-        self.loose.iter().flat_map(|&k| prepared.octahedra.loose[k as usize]).for_each(|p| mark(p as usize));
+        self.edges.iter().flat_map(|&k| prepared.lattice.edges[k as usize]).for_each(|p| mark(p as usize));
         self.sides.iter().flat_map(|&k| prepared.surface.edges[k as usize]).for_each(|i| mark(surface(i)));
         self.triangles.iter().flat_map(|&k| prepared.surface.triangles[k as usize]).for_each(|i| mark(surface(i)));
         // Skin beyond a limb's region is kept near its bones as well, all of it.

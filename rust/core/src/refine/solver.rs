@@ -11,7 +11,7 @@ use super::membrane::Membrane;
 use super::pairs::Slabs;
 use super::predictor::{follow, place_all, place_bound};
 use super::prepared::{ARM, Prepared, TETRAHEDRON};
-use super::projection::{Flesh, Kernel, Octahedra, PartOfStretch, Stretch, fill, project};
+use super::projection::{Flesh, Kernel, Stretch, fill, project};
 use super::report::Report;
 use super::settings::{Quality, Settings};
 use super::skeleton::Path;
@@ -132,7 +132,7 @@ impl Frame<'_> {
             self.local.restart();
             self.membranes.fill_with(|| None);
             for iteration in 1..=iterations {
-                self.iterate(&axes, share as f32, quality == Quality::Bake && iteration == iterations);
+                self.iterate(&axes, share as f32, quality == Quality::Bake || iteration == iterations);
             }
             before = pose;
         }
@@ -155,15 +155,15 @@ impl Frame<'_> {
 
     fn project_lattice(&mut self, untangles: bool) {
         let (settings, local, kernel) = (self.settings, &mut self.local, self.kernel);
-        let (region, flesh) = (&local.region, flesh(settings));
-        let stretch_compliance = (settings.stretch > 0.0).then(|| (1.0 / settings.stretch) as f32);
-        if let Some(compliance) = stretch_compliance {
-            let kind = PartOfStretch(compliance);
+        let region = &local.region;
+        if settings.stretch > 0.0 {
+            let kind = Stretch((1.0 / settings.stretch) as f32);
             project(kernel, kind, &region.edges, &mut local.of_edges, &mut local.particles);
         }
-        let octahedra = Octahedra { flesh, stretch_compliance };
-        project(kernel, octahedra, &region.octahedra, &mut local.of_octahedra, &mut local.particles);
-        project(kernel, flesh, &region.loose, &mut local.of_loose, &mut local.particles);
+        let flesh = flesh(settings);
+        if flesh.volume_compliance.is_some() || flesh.energy_compliance.is_some() {
+            project(kernel, flesh, &region.tetrahedra, &mut local.of_tetrahedra, &mut local.particles);
+        }
         if settings.volume > 0.0 && untangles {
             fill(kernel, &region.tetrahedra, TETRAHEDRON, &mut local.particles, [0.1, 0.3], 8);
         }

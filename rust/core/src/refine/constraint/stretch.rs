@@ -1,6 +1,8 @@
 //! An edge keeps its length.
 
-use super::{Constraint, Projection};
+#[cfg(test)]
+use super::Constraint;
+use super::Projection;
 use crate::refine::number::{Number, Vector, dot, scaled, sub};
 
 /// `|a - b| - length`; no gradient between points that coincide.
@@ -12,7 +14,8 @@ pub fn stretch<T: Number>([a, b]: [Vector<T>; 2], length: T) -> Constraint<T, 2>
     Constraint { value: now - length, gradient: [direction, scaled(direction, length.constant(-1.0))] }
 }
 
-/// [`Constraint::project`] of it with one division: gradients have a length of one.
+/// One step of XPBD of `|a - b| - length` as [`super::Constraint::project`] does it, with one division: both gradients have
+/// a length of one.
 #[inline(always)]
 pub fn project_stretch<T: Number>(
     [a, b]: [Vector<T>; 2],

@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop)]
 
-use super::super::constraint::{Constraint, Projection, project_energy, project_stretch, volume};
+use super::super::constraint::{Constraint, Projection, energy, project_stretch, volume};
 use super::super::number::{Number, Vector, add};
 
 /// Constraints over `N` particles with `M` numbers at rest and `L` multipliers.
@@ -19,24 +19,6 @@ impl Kind<2, 1, 1> for Stretch {
     #[inline(always)]
     fn project<T: Number>(self, places: &mut [Vector<T>; 2], w: [T; 2], [length]: [T; 1], multipliers: &mut [T; 1]) {
         let step = project_stretch(*places, w, length, length.constant(self.0), multipliers[0]);
-        apply(step, places, &mut multipliers[0]);
-    }
-}
-
-/// The same of edges whose stiffness is shared with others; the second number at rest is their share.
-#[derive(Debug, Clone, Copy)]
-pub struct PartOfStretch(pub f32);
-
-impl Kind<2, 2, 1> for PartOfStretch {
-    #[inline(always)]
-    fn project<T: Number>(
-        self,
-        places: &mut [Vector<T>; 2],
-        w: [T; 2],
-        [length, share]: [T; 2],
-        multipliers: &mut [T; 1],
-    ) {
-        let step = project_stretch(*places, w, length, length.constant(self.0) / share, multipliers[0]);
         apply(step, places, &mut multipliers[0]);
     }
 }
@@ -64,9 +46,8 @@ impl Kind<4, 0, 2> for Flesh {
             apply(constraint.project(w, any.constant(compliance), multipliers[0]), places, &mut multipliers[0]);
         }
         if let Some(compliance) = self.energy_compliance {
-            let arms = [any.constant(self.arm); 4];
-            let step = project_energy(*places, w, arms, any.constant(compliance), multipliers[1]);
-            apply(step, places, &mut multipliers[1]);
+            let constraint = energy(*places, [any.constant(self.arm); 4]);
+            apply(constraint.project(w, any.constant(compliance), multipliers[1]), places, &mut multipliers[1]);
         }
     }
 }
@@ -103,11 +84,7 @@ impl Measure<4> for Thin {
 }
 
 #[inline(always)]
-pub(super) fn apply<T: Number, const N: usize>(
-    step: Projection<T, N>,
-    places: &mut [Vector<T>; N],
-    multiplier: &mut T,
-) {
+fn apply<T: Number, const N: usize>(step: Projection<T, N>, places: &mut [Vector<T>; N], multiplier: &mut T) {
     for n in 0..N {
         places[n] = add(places[n], step.moves[n]);
     }

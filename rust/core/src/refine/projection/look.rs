@@ -1,20 +1,16 @@
-//! Looking for constraints that a measure finds below zero, sixteen side by side as the sweeps go.
+//! Looking for constraints that a measure finds below zero, eight side by side as the sweeps go.
 
 // Indices are constants after unrolling; iterators over them are not inlined across instruction sets.
 #![allow(clippy::needless_range_loop)]
 
 use std::ops::Range;
 
-use super::super::number::LANES;
-#[cfg(not(target_arch = "x86_64"))]
-use super::super::number::Lanes;
-#[cfg(target_arch = "x86_64")]
-use super::With;
+use super::super::number::{LANES, Lanes};
 use super::batch::{Batch, Particle};
 use super::kind::Measure;
 use super::register::Register;
 #[cfg(target_arch = "x86_64")]
-use super::wide::{Wide, Widest};
+use super::wide::Wide;
 use super::{Kernel, indices};
 
 /// Calls `found` with those of `range`, ascending, whose measure is below zero.
@@ -44,22 +40,14 @@ struct Look<'a, F, G, const N: usize, const M: usize> {
 impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> Look<'_, F, G, N, M> {
     fn side_by_side(self) {
         #[cfg(target_arch = "x86_64")]
-        {
-            if let Some(simd) = pulp::x86::V4::try_new() {
-                return pulp::Simd::vectorize(simd, With::<Widest, _>(simd, self));
-            }
-            if let Some(simd) = pulp::x86::V3::try_new() {
-                return pulp::Simd::vectorize(simd, With::<Wide, _>(simd, self));
-            }
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return pulp::Simd::vectorize(simd, WithWide { simd, look: self });
         }
-        #[cfg(target_arch = "x86_64")]
-        self.one_by_one();
-        #[cfg(not(target_arch = "x86_64"))]
-        self.side_by_side_in::<Lanes>(());
+        self.eights::<Lanes>(());
     }
 
     #[inline(always)]
-    fn side_by_side_in<R: Register>(mut self, proof: R::Proof) {
+    fn eights<R: Register>(mut self, proof: R::Proof) {
         for from in self.range.clone().step_by(LANES) {
             let count = LANES.min(self.range.end - from);
             let (mut places, mut any) = ([[R::load(proof, &[0.0; LANES]); 3]; N], R::load(proof, &[0.0; LANES]));
@@ -91,16 +79,17 @@ impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> Look<'_, F,
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<R, F, G, const N: usize, const M: usize> pulp::WithSimd for With<R, Look<'_, F, G, N, M>>
-where
-    R: Register,
-    F: Measure<N>,
-    G: FnMut(usize),
-{
+struct WithWide<'a, F, G, const N: usize, const M: usize> {
+    simd: pulp::x86::V3,
+    look: Look<'a, F, G, N, M>,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> pulp::WithSimd for WithWide<'_, F, G, N, M> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        self.1.side_by_side_in::<R>(self.0);
+        self.look.eights::<Wide>(self.simd);
     }
 }

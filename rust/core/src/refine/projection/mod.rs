@@ -1,5 +1,5 @@
 //! Projecting all constraints of a kind: blocks of particles side by side on all threads, then what lies between them;
-//! within a block colour by colour, sixteen constraints side by side, compiled for AVX-512 and AVX2 and chosen at run
+//! within a block colour by colour, eight constraints side by side, compiled for AVX2 and plain code and chosen at run
 //! time. The same bits everywhere, because the same operations are rounded in the same order.
 
 // Indices are constants after unrolling; iterators over them are not inlined across instruction sets.
@@ -11,7 +11,6 @@ mod colouring;
 mod kind;
 mod limit;
 mod look;
-mod octahedron;
 mod register;
 mod untangle;
 #[cfg(target_arch = "x86_64")]
@@ -20,21 +19,16 @@ mod wide;
 pub use self::batch::{Batch, Multipliers, Particle};
 pub use self::blocks::Blocks;
 pub use self::colouring::Colouring;
-pub use self::kind::{Flesh, Kind, PartOfStretch, Stretch};
+pub use self::kind::{Flesh, Kind, Stretch};
 pub use self::limit::{Limits, OfNodes};
-pub use self::octahedron::{MULTIPLIERS, NODES, Octahedra, SHARING};
 use self::register::Register;
 pub use self::untangle::{fill, untangle};
-#[cfg(target_arch = "x86_64")]
-use self::wide::{Wide, Widest};
-use super::number::LANES;
-#[cfg(not(target_arch = "x86_64"))]
-use super::number::Lanes;
+use super::number::{LANES, Lanes};
 
 /// How constraints are gone through. The answer is the same, to the bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kernel {
-    /// Sixteen side by side, where the machine can.
+    /// Eight side by side.
     Lanes,
     /// One after the other, on one thread.
     Scalar,
@@ -132,23 +126,15 @@ struct Sweep<'a, K, const N: usize, const M: usize, const L: usize> {
 impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_, K, N, M, L> {
     fn side_by_side(self) {
         #[cfg(target_arch = "x86_64")]
-        {
-            if let Some(simd) = pulp::x86::V4::try_new() {
-                return pulp::Simd::vectorize(simd, With::<Widest, _>(simd, self));
-            }
-            if let Some(simd) = pulp::x86::V3::try_new() {
-                return pulp::Simd::vectorize(simd, With::<Wide, _>(simd, self));
-            }
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return pulp::Simd::vectorize(simd, WithWide { simd, sweep: self });
         }
-        #[cfg(target_arch = "x86_64")]
-        self.one_by_one();
-        #[cfg(not(target_arch = "x86_64"))]
-        self.side_by_side_in::<Lanes>(());
+        self.eights::<Lanes>(());
     }
 
     /// Run by run. Runs of a few constraints are not worth the registers.
     #[inline(always)]
-    fn side_by_side_in<R: Register>(mut self, proof: R::Proof) {
+    fn eights<R: Register>(mut self, proof: R::Proof) {
         let batch = self.part.batch;
         let span = batch.spans[self.block];
         let mut from = span.from;
@@ -180,11 +166,11 @@ impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_,
         }
         let mut rest = [R::load(proof, &[0.0; LANES]); M];
         for m in 0..M {
-            rest[m] = R::load(proof, &some(&batch.rest[m], from, count));
+            rest[m] = R::load(proof, &eight(&batch.rest[m], from, count));
         }
         let mut own = [R::load(proof, &[0.0; LANES]); L];
         for l in 0..L {
-            own[l] = R::load(proof, &some(multipliers[l], from - *first, count));
+            own[l] = R::load(proof, &eight(multipliers[l], from - *first, count));
         }
         kind.project(&mut places, w, rest, &mut own);
         for n in 0..N {
@@ -196,7 +182,7 @@ impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_,
             let multipliers = &mut multipliers[l][from - *first..];
             // A copy of a length that is not known beforehand is a call, over which no register is kept.
             if count == LANES {
-                *multipliers.first_chunk_mut().expect("sixteen more") = column;
+                *multipliers.first_chunk_mut().expect("eight more") = column;
             } else {
                 multipliers[..count].copy_from_slice(&column[..count]);
             }
@@ -237,33 +223,31 @@ impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> Sweep<'_,
     }
 }
 
-/// What is done with registers `R`, once the instructions are known to be there.
 #[cfg(target_arch = "x86_64")]
-struct With<R: Register, W>(R::Proof, W);
+struct WithWide<'a, K, const N: usize, const M: usize, const L: usize> {
+    simd: pulp::x86::V3,
+    sweep: Sweep<'a, K, N, M, L>,
+}
 
 #[cfg(target_arch = "x86_64")]
-impl<R, K, const N: usize, const M: usize, const L: usize> pulp::WithSimd for With<R, Sweep<'_, K, N, M, L>>
-where
-    R: Register,
-    K: Kind<N, M, L>,
-{
+impl<K: Kind<N, M, L>, const N: usize, const M: usize, const L: usize> pulp::WithSimd for WithWide<'_, K, N, M, L> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        self.1.side_by_side_in::<R>(self.0);
+        self.sweep.eights::<wide::Wide>(self.simd);
     }
 }
 
-/// Numbers from `from` on; where a run ends before them, its last one again.
+/// Eight numbers from `from` on; where a run ends before them, its last one again.
 #[inline(always)]
-fn some(column: &[f32], from: usize, count: usize) -> [f32; LANES] {
+fn eight(column: &[f32], from: usize, count: usize) -> [f32; LANES] {
     if count == LANES {
-        return *column[from..].first_chunk().expect("sixteen more");
+        return *column[from..].first_chunk().expect("eight more");
     }
-    let mut numbers = [column[from]; LANES];
-    numbers[..count].copy_from_slice(&column[from..from + count]);
-    numbers
+    let mut some = [column[from]; LANES];
+    some[..count].copy_from_slice(&column[from..from + count]);
+    some
 }
 
 /// The same of particles, counted from `base`.
@@ -271,7 +255,7 @@ fn some(column: &[f32], from: usize, count: usize) -> [f32; LANES] {
 fn indices(column: &[u32], from: usize, count: usize, base: u32) -> [u32; LANES] {
     let mut some = [column[from] - base; LANES];
     if count == LANES {
-        let column: &[u32; LANES] = column[from..].first_chunk().expect("sixteen more");
+        let column: &[u32; LANES] = column[from..].first_chunk().expect("eight more");
         for lane in 0..LANES {
             some[lane] = column[lane] - base;
         }
