@@ -40,7 +40,6 @@ pub(super) fn measure(
 
 impl Frame<'_> {
     pub(super) fn report(&mut self, path: &Path<'_>, pose: &[DAffine3]) -> Report {
-        self.untangle();
         let axes = self.axes(pose);
         let before = skinned(self.prepared, &self.local, pose);
         let joints = (0..self.active.len()).map(|k| self.joint_report(k, path, pose, &axes[k], &before)).collect();

@@ -10,7 +10,7 @@ use super::membrane::Membrane;
 use super::prepared::TETRAHEDRON;
 use super::projection::untangle;
 use super::settings::Quality;
-use super::solver::{FARTHEST, Frame, KEPT};
+use super::solver::{FARTHEST, Frame, KEPT, Work};
 
 /// Times that tetrahedra turned inside out are looked for at the end.
 const UNTANGLING: usize = 24;
@@ -19,7 +19,7 @@ const STILL: f32 = 3e-5;
 
 impl Frame<'_> {
     /// The last passes over the creases, and the volume.
-    pub(super) fn finish(&mut self, pose: &[DAffine3], skin: &[[f32; 3]], quality: Quality) {
+    pub(super) fn finish(&mut self, pose: &[DAffine3], skin: &[[f32; 3]], Work { quality, with_figures, .. }: Work) {
         let axes = self.axes(pose);
         let mut clock = std::mem::take(&mut self.clock);
         self.membranes.fill_with(|| None);
@@ -28,6 +28,9 @@ impl Frame<'_> {
             Quality::Live => self.triangles_that_may_fold(),
             Quality::Bake => (0..self.local.triangles.len() as u32).collect(),
         };
+        if with_figures {
+            clock.time("untangle", || self.untangle());
+        }
         let (mut parted, mut left, mut lost, mut cleared) = (Vec::new(), 0, Vec::new(), Vec::new());
         // Planes leave few folds, and balloons none more. Hips have no planes: what parting costs there is restored.
         if self.active.iter().any(|active| !active.joint.is_limb) {
@@ -59,7 +62,7 @@ impl Frame<'_> {
 
     /// Puts right what tetrahedra the path has left inside out. No skin follows the lattice any more then, so that a frame of
     /// which only the skin is wanted does without.
-    pub(super) fn untangle(&mut self) {
+    fn untangle(&mut self) {
         if self.settings.volume > 0.0 {
             let (tetrahedra, particles) = (&self.local.region.tetrahedra, &mut self.local.particles);
             untangle(self.kernel, tetrahedra, TETRAHEDRON, particles, [0.05, 0.2], 3, UNTANGLING);

@@ -57,8 +57,9 @@ pub(super) fn solve(
     settings: &Settings,
     pose: &[DAffine3],
     skin: &[[f32; 3]],
-    Work { quality, kernel, with_figures }: Work,
+    work: Work,
 ) -> Solution {
+    let Work { quality, kernel, with_figures } = work;
     let mut clock = Clock::default();
     let path = Path::new(&prepared.skeleton, pose);
     let active = active_joints(&prepared.joints, &path, pose);
@@ -71,7 +72,7 @@ pub(super) fn solve(
     let mut frame =
         Frame { prepared, settings, active: &active, local, kernel, clock, iterations: 0, slabs, membranes };
     frame.walk(&path, quality);
-    frame.finish(pose, skin, quality);
+    frame.finish(pose, skin, work);
     let report = if with_figures { frame.report(&path, pose) } else { Report::default() };
     Solution { moved: frame.moved(), report, slabs: frame.slabs }
 }
