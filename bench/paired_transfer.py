@@ -1,8 +1,9 @@
-"""CPU seconds of a whole transfer in Blender with the paper's method, this checkout against another one, taking turns.
+"""CPU seconds of a transfer with the paper's method, this checkout against another one, taking turns.
 
     python bench/paired_transfer.py ../before --native out/develop --other-native ../before/out/develop
 
-Each side is a process of its own with its own add-on and native module; the figures are medians of the turns.
+First the native module alone on the benchmark's meshes, then a whole transfer in Blender of 100,000 vertices. Each side
+is a process of its own with its own add-on and native module; the figures are medians of the turns.
 """
 
 import argparse
@@ -15,7 +16,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-SIDES = {"quads": (400, 250), "triangles": (400, 250)}
+NATIVE = ("20k", "100k", "300k")
+IN_BLENDER = ("quads", "triangles")
+AROUND, ALONG = 400, 250
 
 
 def main() -> None:
@@ -28,10 +31,10 @@ def main() -> None:
     parser.add_argument("--work", default="", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.work:
-        _work(options.work)
+        (_work_natively if options.work in NATIVE else _work_in_blender)(options.work)
         return
     print(f"load {os.getloadavg()[0]:.1f}")
-    for kind in SIDES:
+    for kind in (*NATIVE, *IN_BLENDER):
         sides = [_start(ROOT, options.native, kind), _start(options.other, options.other_native, kind)]
         taken: list[list[float]] = [[], []]
         for _ in range(options.turns):
@@ -63,7 +66,27 @@ def _turn(side: subprocess.Popen) -> float:
     return float(line.split()[1])
 
 
-def _work(kind: str) -> None:
+def _work_natively(size: str) -> None:
+    """Prepare arrays once, then transfer at every line that comes, from the body's index to the rows."""
+    import skinwright_native as native
+
+    sys.path.append(str(ROOT / "tests" / "support"))
+    import meshes
+    import numpy as np
+
+    body, garment = meshes.load("source"), meshes.load(size)
+    vertex, bone = np.nonzero(body.weights)
+    indptr = np.searchsorted(vertex, range(len(body.weights) + 1))
+    rows = (indptr.astype(np.uint32), bone.astype(np.uint32), body.weights[vertex, bone])
+    weights = native.Weights(*rows, body.weights.shape[1])
+    for _ in sys.stdin:
+        start = time.process_time()
+        native.Source(body.positions, body.triangles, weights).transfer(garment.positions, garment.triangles)
+        print(f"took {time.process_time() - start:.6f}", flush=True)
+    os._exit(0)
+
+
+def _work_in_blender(kind: str) -> None:
     """Prepare a scene once, then transfer at every line that comes."""
     import bpy
 
@@ -71,7 +94,7 @@ def _work(kind: str) -> None:
     addon = importlib.import_module("skinwright")
     addon.register()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    source, target = _body(bpy), _garment(bpy, *SIDES[kind], triangles=kind == "triangles")
+    source, target = _body(bpy), _garment(bpy, AROUND, ALONG, triangles=kind == "triangles")
     settings = addon.transfer.TransferParams
     params = settings(**{"method": "paper"} if hasattr(settings, "method") else {})  # both sides the same
     for _ in sys.stdin:

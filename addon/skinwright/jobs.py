@@ -34,6 +34,9 @@ class Work(Protocol):
     def cancel(self) -> None:
         """Ask it to stop."""
 
+    def wait(self, seconds: float) -> None:
+        """Return at its end, or after so many seconds."""
+
     def result(self) -> Any:
         """The answer; waits for it."""
 
@@ -47,6 +50,9 @@ class Step:
 
     def cancel(self) -> None:
         """There is nothing going on."""
+
+    def wait(self, seconds: float) -> None:
+        """There is nothing to wait for."""
 
     def result(self) -> None:
         """There is nothing to answer."""
@@ -73,11 +79,10 @@ class Runner:
             self._answer(self._job)
         return self.done
 
-    def wait(self, seconds: float, look: float = 0.0) -> None:
-        """Give the present job this long to end; look at it every `look` seconds, or a few times if that is 0."""
-        end = time.perf_counter() + seconds
-        while self._job and not self._job.done and time.perf_counter() < end:
-            time.sleep(look or max(0.001, 0.25 * seconds))
+    def wait(self, seconds: float) -> None:
+        """Give the present job this long to end."""
+        if self._job:
+            self._job.wait(seconds)
 
     def cancel(self) -> None:
         """Stop without the steps that are left."""
@@ -104,11 +109,10 @@ class Runner:
 
 def wait(steps: Jobs[T]) -> T:
     """Do all steps before returning; without a window the progress of long work goes to stderr."""
-    runner, started = Runner(steps), time.perf_counter()
+    runner = Runner(steps)
     watch = _print_progress() if bpy.app.background else None
     while not runner.poll():
-        # Short work is not made to wait for the next look at it, nor are steps of Python's own.
-        runner.wait(min(0.1, 0.0005 + 0.02 * (time.perf_counter() - started)))
+        runner.wait(0.1)
         if watch:
             watch(runner.progress)
     return runner.result

@@ -156,6 +156,9 @@ class Job:
     @property
     def done(self) -> bool: ...
     def cancel(self) -> None: ...
+    def wait(self, seconds: float) -> bool:
+        """Waits at most so many seconds for the work's end; returns whether it has come."""
+
     def result(self) -> Any:
         """Waits for what the function that started the job returns, or raises its error. May be called again."""
 

@@ -112,7 +112,7 @@ class Blender:
         record = kept / "record.json"
         if done.returncode != 0 or not record.exists():
             pytest.fail(f"{self.name} {script}: exit code {done.returncode}\n{log[-4000:]}", pytrace=False)
-        return json.loads(record.read_text())
+        return json.loads(record.read_text()) | {"log": log}
 
 
 def lay_out(share: Path) -> None:

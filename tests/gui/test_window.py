@@ -2,6 +2,8 @@
 
 import os
 
+import pytest
+
 
 def test_the_panel_opens_and_nothing_is_left_behind(blender):
     assert blender.run("smoke")["tab"] == "Weights"
@@ -19,6 +21,13 @@ def test_painting_the_mask_moves_the_weights_and_esc_brings_them_back(blender):
 
 def test_long_work_shows_progress_and_esc_stops_it(blender):
     assert max(blender.run("long_work", size=(1100, 800))["progress"]) > 0
+
+
+@pytest.mark.parametrize("kind", ["transfer", "sculpt", "mask"])
+def test_quitting_ends_what_goes_on_without_an_error(blender, kind):
+    seen = blender.run("quitting", kind, size=(700, 520))
+    assert "Blender quit" in seen["log"] and "panicked" not in seen["log"]
+    assert "skinwright" not in seen["log"].partition("Traceback")[2]  # Debian's Blender has tracebacks of its own
 
 
 def test_automatic_weights_show_progress_and_are_one_undo_step(blender):

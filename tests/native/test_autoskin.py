@@ -110,7 +110,9 @@ def test_a_job_returns_the_same_and_can_be_cancelled():
     assert np.array_equal(job.result().weights.values, once.weights.values)
     assert job.progress == 1
     cancelled = native.start_automatic_weights(*(cylinder(120, 400)), *chain(), resolution=400)
+    assert not cancelled.wait(0)
     cancelled.cancel()
+    assert cancelled.wait(60)
     with pytest.raises(native.Cancelled):
         cancelled.result()
 

@@ -102,7 +102,7 @@ class MaskPainting:
             self._asked = asked
             self._start(params, near=True)
             if self._runner:
-                self._runner.wait(PATIENCE_SECONDS, look=0.002)
+                self._runner.wait(PATIENCE_SECONDS)
         elif self.unsettled and self._runner is None and time.perf_counter() > self.written_at[-1] + REST_SECONDS:
             self._start(self.unsettled, near=False)
             self._settling = self._runner is not None

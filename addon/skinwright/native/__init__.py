@@ -127,6 +127,10 @@ class Job:
         """Ask the work to stop; `result` then raises NativeError."""
         self._job.cancel()
 
+    def wait(self, seconds: float) -> None:
+        """Return at the work's end, or after so many seconds."""
+        self._job.wait(seconds)
+
     def result(self) -> tuple[Any, Rows]:
         """skinwright_native.Transfer and its rows; waits for them."""
         with _naming(self._name):

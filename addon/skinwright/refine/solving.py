@@ -39,6 +39,10 @@ class Solving:
         """Stop after the call that is going on."""
         self._stop.set()
 
+    def wait(self, seconds: float) -> None:
+        """Return at its end, or after so many seconds."""
+        self._thread.join(seconds)
+
     def result(self) -> list[Any]:
         """What the tasks returned; raises what one of them raised."""
         self._thread.join()

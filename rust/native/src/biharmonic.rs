@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use skinwright_core::TriMesh;
 use skinwright_core::biharmonic::BiharmonicEmbedding;
-use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{Matrix, triples};
-use crate::error::enter;
+use crate::error::enter_stoppable;
 use crate::ranges;
 
 /// Coordinates (V, n_pairs) in which the Euclidean distance is the biharmonic distance, each island by itself.
@@ -20,9 +20,9 @@ pub fn biharmonic_embedding<'py>(
     #[pyo3(from_py_with = ranges::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (positions, triangles) = (triples(&positions, "positions")?, triples(&triangles, "triangles")?);
-    let embedding = enter(py, threads, || {
+    let embedding = enter_stoppable(py, threads, |progress| {
         let mesh = TriMesh::new(&positions, &triangles, "given")?;
-        BiharmonicEmbedding::new(&mesh, n_pairs, &Progress::default())
+        BiharmonicEmbedding::new(&mesh, n_pairs, progress)
     })?;
     PyArray1::from_vec(py, embedding.into_values()).reshape([positions.len(), n_pairs])
 }

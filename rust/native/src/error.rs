@@ -1,12 +1,17 @@
 //! The one table from the core's errors to Python exceptions, and the one door that frees the GIL.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::OnceLock;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, OnceLock};
+use std::thread::Builder;
+use std::time::Duration;
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use skinwright_core::Error;
+use skinwright_core::{Error, Progress};
+
+use crate::waiting;
 
 create_exception!(skinwright_native, SkinwrightError, PyValueError, "Base of every error of this module.");
 create_exception!(skinwright_native, NothingMatched, SkinwrightError, "No target vertex matches the source.");
@@ -83,4 +88,27 @@ pub fn enter<T: Send>(
     work: impl FnOnce() -> skinwright_core::Result<T> + Send,
 ) -> PyResult<T> {
     finish(py.detach(|| run(threads, work)))
+}
+
+/// The door of work that may take long: Ctrl C stops it and is raised.
+pub fn enter_stoppable<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce(&Progress) -> skinwright_core::Result<T> + Send,
+) -> PyResult<T> {
+    let progress = &Progress::default();
+    let (running, ended) = waiting::end();
+    let work = move || {
+        let _running = running;
+        run(threads, || work(progress))
+    };
+    let (outcome, interrupt) = std::thread::scope(|scope| {
+        let worker = match Builder::new().spawn_scoped(scope, work) {
+            Ok(worker) => worker,
+            Err(error) => return (Err(format!("no thread can be started: {error}")), None),
+        };
+        let interrupt = ended.watched(py, progress);
+        (py.detach(|| worker.join()).unwrap_or_else(|_| Err("the work's thread was lost".into())), interrupt)
+    });
+    interrupt.map_or_else(|| finish(outcome), Err)
 }

@@ -2,11 +2,11 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use skinwright_core::Weld;
 use skinwright_core::fill::{Constraint, Fill, Row};
-use skinwright_core::{Progress, Weld};
 
 use crate::arrays::{Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, enter};
+use crate::error::{InvalidParameter, enter_stoppable};
 use crate::memory;
 use crate::ranges;
 
@@ -37,13 +37,12 @@ pub fn fill<'py>(
         let vertex = at / shape[1];
         return Err(InvalidParameter::new_err(format!("rows has a value that is not finite at vertex {vertex}")));
     }
-    let values = enter(py, threads, || {
-        let progress = Progress::default();
+    let values = enter_stoppable(py, threads, |progress| {
         let mut fill = Fill::new(positions, triangles, weld)?;
-        let assembled = fill.assemble(constraints, length, &progress)?;
-        fill.factor(assembled, &progress)?;
+        let assembled = fill.assemble(constraints, length, progress)?;
+        fill.factor(assembled, progress)?;
         let given = |i: u32, out: &mut Row| out.extend(std::iter::zip(0.., of_row(&rows, i as usize, shape[1])));
-        let filled = fill.solve(&given, &progress)?;
+        let filled = fill.solve(&given, progress)?;
         let mut row = Row::new();
         let mut values = vec![f64::NAN; rows.len()];
         for (i, values) in values.chunks_exact_mut(shape[1].max(1)).enumerate() {

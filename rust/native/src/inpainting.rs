@@ -9,7 +9,7 @@ use skinwright_core::Progress;
 use skinwright_core::transfer::{self as core, TargetMesh};
 
 use crate::arrays::{Matrix, pairs, read_only, triples};
-use crate::error::enter;
+use crate::error::{enter, enter_stoppable};
 use crate::job::Job;
 use crate::memory;
 use crate::ranges;
@@ -87,7 +87,8 @@ impl Inpainting {
         let (settings, _) = keywords(settings)?;
         let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
         let (source, n_bones) = (source.core.clone(), source.core.n_bones());
-        let core = enter(py, threads, || core::Inpainting::new(source, target, &settings, &Progress::default()))?;
+        let prepare = |progress: &Progress| core::Inpainting::new(source, target, &settings, progress);
+        let core = enter_stoppable(py, threads, prepare)?;
         let (distance, angle) = (read_only(py, core.distances())?, read_only(py, core.angles())?);
         let islands = read_only(py, core.island_of_vertex())?;
         Ok(Self { core: Arc::new(Mutex::new(core)), distance, angle, islands, n_bones, threads })
@@ -146,10 +147,8 @@ impl Inpainting {
     fn solve(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
         expect_solve(&self.enter(py, |inpainting| inpainting.matched(mask.as_deref(), &settings))?)?;
-        let solve =
-            |inpainting: &mut core::Inpainting| inpainting.solve(mask.as_deref(), &settings, &Progress::default());
-        let transfer = self.enter(py, solve)?;
-        Transfer::of(py, transfer)
+        let solve = |progress: &Progress| lock(&self.core).solve(mask.as_deref(), &settings, progress);
+        Transfer::of(py, enter_stoppable(py, self.threads, solve)?)
     }
 
     /// Starts `solve` on threads of its own. With `near` only the neighbourhood of what the mask has changed since the last

@@ -2,12 +2,17 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use skinwright_core::Progress;
 
 use crate::error::{Outcome, SkinwrightError, finish, is_forked, run};
+use crate::waiting::{self, End};
+
+/// In seconds; more would be another name for ever.
+const LONGEST_WAIT: f64 = 3600.0;
 
 /// Turns what the core returned into what Python gets.
 type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
@@ -17,6 +22,7 @@ type Present = Box<dyn FnOnce(Python<'_>) -> PyResult<Py<PyAny>> + Send>;
 pub struct Job {
     progress: Arc<Progress>,
     thread: Mutex<Option<JoinHandle<Outcome<Present>>>>,
+    end: End,
     /// Held by whoever waits for the thread: others wait behind them.
     turn: Mutex<()>,
     result: OnceLock<PyResult<Py<PyAny>>>,
@@ -36,20 +42,30 @@ impl Job {
             let result = work(seen)?;
             Ok(Box::new(move |py: Python<'_>| present(py, result)) as Present)
         };
-        let thread = std::thread::Builder::new().spawn(move || run(threads, move || presented(&seen)));
+        let (running, end) = waiting::end();
+        let thread = std::thread::Builder::new().spawn(move || {
+            let _running = running;
+            run(threads, move || presented(&seen))
+        });
         let thread = thread.map_err(|error| SkinwrightError::new_err(format!("no thread can be started: {error}")))?;
-        Ok(Self { progress, thread: Mutex::new(Some(thread)), turn: Mutex::new(()), result: OnceLock::new() })
+        Ok(Self { progress, thread: Mutex::new(Some(thread)), end, turn: Mutex::new(()), result: OnceLock::new() })
     }
 
-    fn wait(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        if is_forked() {
-            return Err(SkinwrightError::new_err("this job runs in the process that started it: wait for it there"));
-        }
+    fn outcome(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        expect_own_process()?;
         let thread = self.thread.lock().expect("never poisoned").take();
         let Some(thread) = thread else { return Err(SkinwrightError::new_err("this job was interrupted")) };
+        if let Some(interrupt) = self.end.watched(py, &self.progress) {
+            return Err(interrupt);
+        }
         let outcome = py.detach(|| thread.join()).unwrap_or_else(|_| Err("the job's thread was lost".into()));
         finish(outcome)?(py)
     }
+}
+
+fn expect_own_process() -> PyResult<()> {
+    let refusal = || SkinwrightError::new_err("this job runs in the process that started it: wait for it there");
+    if is_forked() { Err(refusal()) } else { Ok(()) }
 }
 
 #[pymethods]
@@ -63,8 +79,7 @@ impl Job {
     /// Whether `result()` returns at once.
     #[getter]
     fn done(&self) -> bool {
-        self.result.get().is_some()
-            || self.thread.lock().expect("never poisoned").as_ref().is_some_and(JoinHandle::is_finished)
+        self.result.get().is_some() || self.end.has_come()
     }
 
     /// Asks the work to stop; `result()` then raises `Cancelled` unless it had finished already.
@@ -72,11 +87,18 @@ impl Job {
         self.progress.cancel();
     }
 
+    /// Waits at most so many seconds for the work's end; returns whether it has come.
+    fn wait(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
+        expect_own_process()?;
+        let time = Duration::try_from_secs_f64(seconds.clamp(0.0, LONGEST_WAIT)).unwrap_or_default();
+        Ok(self.end.within(py, time))
+    }
+
     /// Waits for the work and returns what it gave, or raises its error. May be called again, and from several threads.
     fn result(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let turn = self.turn.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
         if self.result.get().is_none() {
-            let result = self.wait(py);
+            let result = self.outcome(py);
             let _ = self.result.set(result);
         }
         drop(turn);
@@ -106,7 +128,7 @@ macro_rules! call_and_job {
         #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
         pub fn $call($py: Python<'_>, $($(#[$($attribute)*])* $name: $kind),+) -> PyResult<$returns> {
             let inputs = $inputs;
-            let result = crate::error::enter($py, $threads, || inputs.run(&Progress::default()))?;
+            let result = crate::error::enter_stoppable($py, $threads, |progress| inputs.run(progress))?;
             present($py, result)
         }
 

@@ -19,6 +19,7 @@ mod settings;
 mod skinning;
 mod source;
 mod transfer;
+mod waiting;
 mod weights;
 
 use pyo3::prelude::*;

@@ -11,7 +11,7 @@ use skinwright_core::refine as core;
 use skinwright_core::{Progress, TriMesh};
 
 use crate::arrays::{self, Matrix, Vector, entries, triples};
-use crate::error::{InvalidParameter, SkinwrightError, enter, is_forked, to_python};
+use crate::error::{InvalidParameter, SkinwrightError, enter, enter_stoppable, is_forked, to_python};
 use crate::memory;
 use crate::ranges;
 use crate::skinning::{Stack, pose, vectors};
@@ -63,11 +63,11 @@ impl Refiner {
         let settings = core::Settings { cell, stretch, volume, bind, energy, self_collision };
         settings.check().map_err(to_python)?;
         memory::expect("Preparing the refinement", memory::of_refiner(&positions, &triangles, cell))?;
-        let build = || {
+        let build = |progress: &Progress| {
             let mesh = TriMesh::new(&positions, &triangles, "character")?;
-            core::Refiner::new(&mesh, &weights, &parents, &segments, settings, &Progress::default())
+            core::Refiner::new(&mesh, &weights, &parents, &segments, settings, progress)
         };
-        let core = enter(py, threads, build)?;
+        let core = enter_stoppable(py, threads, build)?;
         let pool = (threads > 0).then(|| ThreadPoolBuilder::new().num_threads(threads).build()).transpose();
         let pool = pool.map_err(|error| SkinwrightError::new_err(format!("no threads can be started: {error}")))?;
         Ok(Self { core, pool, last: Mutex::new(None) })

@@ -4,11 +4,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use skinwright_core::Progress;
 use skinwright_core::transfer as core;
 
 use crate::arrays::{Matrix, triples};
-use crate::error::enter;
+use crate::error::{enter, enter_stoppable};
 use crate::inpainting::{expect_solve, target_mesh};
 use crate::memory;
 use crate::ranges;
@@ -75,14 +74,14 @@ impl Source {
     ) -> PyResult<Transfer> {
         let (settings, mask) = keywords(settings)?;
         let target = target_mesh(&target_positions, &target_triangles, target_edges.as_ref())?;
-        let (progress, mask) = (Progress::default(), mask.as_deref());
-        let (mut inpainting, matched) = enter(py, threads, || {
-            let mut inpainting = core::Inpainting::new(self.core.clone(), target, &settings, &progress)?;
+        let mask = mask.as_deref();
+        let (mut inpainting, matched) = enter_stoppable(py, threads, |progress| {
+            let mut inpainting = core::Inpainting::new(self.core.clone(), target, &settings, progress)?;
             let matched = inpainting.matched(mask, &settings)?;
             Ok((inpainting, matched))
         })?;
         expect_solve(&matched)?;
-        Transfer::of(py, enter(py, threads, || inpainting.solve(mask, &settings, &progress))?)
+        Transfer::of(py, enter_stoppable(py, threads, |progress| inpainting.solve(mask, &settings, progress))?)
     }
 }
 
