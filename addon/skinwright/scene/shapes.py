@@ -149,8 +149,8 @@ def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: li
         return vertex_groups.read_evaluated(evaluated, seen, names)
 
 
-def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
-    """Whether this modifier moves the mesh's own vertices, by more than rounding; Geometry Nodes may make others."""
+def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier, least: float) -> bool:
+    """Whether this modifier moves the mesh's own vertices, by more than `least` of its size; nodes may make others."""
     place = list(obj.modifiers).index(modifier)
     with looked_at([obj], "AS_SHOWN"), _evaluable(obj) as shown:
         others = [m for m in list(shown.modifiers)[:place] if not modifiers.keeps_vertices(m)]
@@ -158,7 +158,7 @@ def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
         before, after = _positions_without(shown, [*others, shown.modifiers[place]]), _positions_without(shown, others)
     if before.shape != after.shape or not before.size:
         return False
-    return float(np.abs(after - before).max()) > 1e-5 * float(np.ptp(before, axis=0).max())
+    return float(np.abs(after - before).max()) > least * float(np.ptp(before, axis=0).max())
 
 
 def _plain(obj: bpy.types.Object) -> Shape:
