@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SparseRows, SymmetricMatrix};
+use skinwright_solve::{Cholesky, Failure, Precision, RightHandSides, Solution, SparseRows, SymmetricMatrix};
 
 use super::constraint::Known;
 use super::rows::{KnownRows, Row};
@@ -16,12 +16,20 @@ use crate::progress::Progress;
 /// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;
 
+/// Which energy a block minimises, and how its factor is stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Form {
+    /// l.
+    pub length: f64,
+    pub precision: Precision,
+}
+
 /// The assembled system of a block of unknowns.
 #[derive(Debug)]
 pub struct System {
     unknowns: Vec<u32>,
     soft: Vec<(u32, f64)>,
-    length: f64,
+    form: Form,
     matrix: SymmetricMatrix,
     boundary: Boundary,
 }
@@ -32,19 +40,19 @@ impl System {
         &self.unknowns
     }
 
-    /// Takes the block for that of another `length`, because its own cannot be solved.
-    pub(super) fn standing_for(self, length: f64) -> Self {
-        Self { length, ..self }
+    /// Takes the block for that of another `form`, because its own cannot be solved.
+    pub(super) fn standing_for(self, form: Form) -> Self {
+        Self { form, ..self }
     }
 
     /// Assembles the block of `unknowns`; `number` is from [`system::number_unknowns`].
-    pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], length: f64) -> Self {
-        let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, length);
+    pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], form: Form) -> Self {
+        let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, form.length);
         let soft: Vec<_> = soft_unknowns(known, &unknowns).collect();
         for &(k, confidence) in &soft {
             matrix.values[matrix.column_starts[k as usize]] += confidence;
         }
-        Self { unknowns, soft, length, matrix, boundary }
+        Self { unknowns, soft, form, matrix, boundary }
     }
 }
 
@@ -61,7 +69,7 @@ pub struct Block {
     unknowns: Vec<u32>,
     /// Places of the soft unknowns and their confidences.
     pub(super) soft: Vec<(u32, f64)>,
-    length: f64,
+    form: Form,
     pub(super) boundary: Boundary,
     pub(super) factor: Cholesky,
     /// Backward error of a solve whose answer is 1 everywhere, once somebody asked.
@@ -81,7 +89,7 @@ enum Values<'b> {
     /// no energy.
     Constant(f64),
     Solved(Solution<'b>),
-    /// Some columns each, and the backward error of the factor.
+    /// Some columns each, and the backward error of the first solve.
     Sparse(Vec<SparseColumns<'b>>, f64),
 }
 
@@ -126,7 +134,7 @@ impl<'b> SparseColumns<'b> {
 }
 
 impl<'b> BlockRows<'b> {
-    /// These columns, by column; `residual` is the factor's backward error.
+    /// These columns, by column; `residual` is the largest backward error.
     pub(super) fn sparse(rows: Vec<SparseColumns<'b>>, residual: f64) -> Self {
         Self { columns: Vec::new(), values: Values::Sparse(rows, residual) }
     }
@@ -183,13 +191,14 @@ impl Block {
     /// # Errors
     /// [`Error::NotPositiveDefinite`] with a vertex of the block, [`Error::Cancelled`].
     pub fn new(positions: &[[f32; 3]], system: System, progress: &Progress) -> Result<Self> {
-        let System { unknowns, soft, length, matrix, boundary } = system;
+        let System { unknowns, soft, form, matrix, boundary } = system;
         let positions: Vec<_> = unknowns.iter().map(|&i| positions[i as usize].into()).collect();
-        let factor = Cholesky::factor_until(matrix, &positions, progress.stop()).map_err(|failure| match failure {
+        let factor = Cholesky::factor_in(form.precision, matrix, &positions, progress.stop());
+        let factor = factor.map_err(|failure| match failure {
             Failure::NotPositive(failed) => Error::NotPositiveDefinite { vertex: unknowns[failed.unknown] as usize },
             Failure::Stopped => Error::Cancelled,
         })?;
-        Ok(Self { unknowns, soft, length, boundary, factor, accuracy: OnceLock::new() })
+        Ok(Self { unknowns, soft, form, boundary, factor, accuracy: OnceLock::new() })
     }
 
     /// The block's vertices, ascending.
@@ -197,11 +206,9 @@ impl Block {
         &self.unknowns
     }
 
-    /// Whether this factorisation serves the block of `unknowns` with the confidences of `known` at `length`.
-    pub(super) fn serves(&self, unknowns: &[u32], known: &Known, length: f64) -> bool {
-        self.length == length
-            && self.unknowns == unknowns
-            && soft_unknowns(known, unknowns).eq(self.soft.iter().copied())
+    /// Whether this factorisation serves the block of `unknowns` with the confidences of `known` in this `form`.
+    pub(super) fn serves(&self, unknowns: &[u32], known: &Known, form: Form) -> bool {
+        self.form == form && self.unknowns == unknowns && soft_unknowns(known, unknowns).eq(self.soft.iter().copied())
     }
 
     /// Rows of the unknowns.

@@ -21,16 +21,16 @@ const FORK_COLUMNS: usize = 1000;
 /// Memory for one solve after the other.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    halfway: Option<Buffer>,
-    stacks: Stacks,
+    halfway: Option<Buffer<f32>>,
+    stacks: Stacks<f32>,
 }
 
 /// Solves for `given` where the solution matters: `least` is the magnitude up to which it counts as zero at each place (n).
 /// Once `stop` is set the answer means nothing.
 pub(crate) fn solve<'f>(
-    (tree, panels, arch): (&'f Tree, &[f64], Arch),
+    (tree, panels, arch): (&'f Tree, &[f32], Arch),
     given: &Sum<'_, 'f>,
-    least: &[f64],
+    least: &[f32],
     work: &mut Workspace,
     stop: &AtomicBool,
 ) -> SparseRows<'f> {
@@ -38,7 +38,7 @@ pub(crate) fn solve<'f>(
     let length = tree.fronts.iter().zip(&active).map(|(front, active)| front.columns * active.width).sum();
     let halfway = Buffer::at_least(&mut work.halfway, length);
     forward(tree, panels, arch, given, &active, None, halfway, &mut work.stacks);
-    let (mut panel_starts, mut starts, mut subtree_least) = (Vec::new(), Vec::new(), Vec::<f64>::new());
+    let (mut panel_starts, mut starts, mut subtree_least) = (Vec::new(), Vec::new(), Vec::<f32>::new());
     let (mut panel_start, mut start) = (0, 0);
     for (front, active) in tree.fronts.iter().zip(&active) {
         panel_starts.push(panel_start);
@@ -47,7 +47,7 @@ pub(crate) fn solve<'f>(
         start += front.columns * active.width;
         let own = least[front.start..front.start + front.columns].iter().copied();
         let below = front.children.iter().map(|&child| subtree_least[child]);
-        subtree_least.push(own.chain(below).fold(f64::INFINITY, f64::min));
+        subtree_least.push(own.chain(below).fold(f32::INFINITY, f32::min));
     }
     let mut fronts = vec![Place::default(); tree.fronts.len()];
     let (root, halfway) = (tree.root(), &halfway[..]);
@@ -62,12 +62,12 @@ pub(crate) fn solve<'f>(
 #[derive(Debug, Default)]
 struct Found {
     rows: Builder,
-    free: Vec<Vec<f64>>,
+    free: Vec<Vec<f32>>,
 }
 
 impl Found {
     /// Memory for so many zeros.
-    fn zeroed(&mut self, len: usize) -> Vec<f64> {
+    fn zeroed(&mut self, len: usize) -> Vec<f32> {
         let mut memory = self.free.pop().unwrap_or_default();
         memory.clear();
         memory.resize(len, 0.0);
@@ -79,17 +79,17 @@ impl Found {
 /// solution around is not negligible.
 struct Backward<'a> {
     tree: &'a Tree,
-    panels: &'a [f64],
+    panels: &'a [f32],
     panel_starts: Vec<usize>,
     arch: Arch,
     /// What forward substitution has left: columns of each front, where its rows start, and all of them.
     active: Vec<Active>,
     starts: Vec<usize>,
-    halfway: &'a [f64],
+    halfway: &'a [f32],
     /// Magnitude that counts as zero, by place.
-    least: &'a [f64],
+    least: &'a [f32],
     /// The smallest of them in each front's subtree.
-    subtree_least: Vec<f64>,
+    subtree_least: Vec<f32>,
     /// Columns of a subtree from which on it is divided between threads.
     fork: usize,
     stop: &'a AtomicBool,
@@ -99,8 +99,8 @@ struct Backward<'a> {
 struct Solved<'a> {
     index: usize,
     active: Active,
-    own: &'a [f64],
-    boundary: &'a [f64],
+    own: &'a [f32],
+    boundary: &'a [f32],
 }
 
 impl Backward<'_> {
@@ -110,7 +110,7 @@ impl Backward<'_> {
         &self,
         index: usize,
         active: Active,
-        boundary: Vec<f64>,
+        boundary: Vec<f32>,
         fronts: &mut [Place],
         first: usize,
         found: &mut Found,
@@ -142,7 +142,7 @@ impl Backward<'_> {
         match roots {
             [] => {}
             &[root] => {
-                let active = Active::of(self.active[root].mask | self.noticeable(root, parent));
+                let active = Active::of::<f32>(self.active[root].mask | self.noticeable(root, parent));
                 let boundary = self.boundary(root, active, parent, found);
                 self.descend(root, active, boundary, fronts, first, found);
             }
@@ -168,7 +168,7 @@ impl Backward<'_> {
     }
 
     /// The rows of the parent's solution under the columns of `child`.
-    fn rows_under<'a>(&'a self, child: usize, parent: &'a Solved) -> impl Iterator<Item = &'a [f64]> {
+    fn rows_under<'a>(&'a self, child: usize, parent: &'a Solved) -> impl Iterator<Item = &'a [f32]> {
         let (columns, width) = (self.tree.fronts[parent.index].columns, parent.active.width);
         self.tree.fronts[child].in_parent.iter().map(move |&place| match (place as usize).checked_sub(columns) {
             None => &parent.own[place as usize * width..][..width],
@@ -183,7 +183,7 @@ impl Backward<'_> {
     }
 
     /// The solution in the rows under the columns of `child`, (rows padded to whole blocks, width).
-    fn boundary(&self, child: usize, active: Active, parent: &Solved, found: &mut Found) -> Vec<f64> {
+    fn boundary(&self, child: usize, active: Active, parent: &Solved, found: &mut Found) -> Vec<f32> {
         let count = self.tree.fronts[child].rows.len().next_multiple_of(BLOCK);
         let mut boundary = found.zeroed(count * active.width);
         if active.mask == 0 {
