@@ -127,9 +127,12 @@ impl<'b> SparseColumns<'b> {
         self.solves.rows.minimum(self.least)
     }
 
-    fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let noticeable = self.solves.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
-        noticeable.map(|(slot, value)| (self.columns[slot as usize], value))
+    fn append_row(&self, k: usize, out: &mut Row) {
+        self.solves.rows.for_each_in_row(k, |slot, value| {
+            if value.abs() >= self.least {
+                out.push((self.columns[slot], value));
+            }
+        });
     }
 }
 
@@ -144,16 +147,13 @@ impl<'b> BlockRows<'b> {
         Self { columns: vec![column], values: Values::Constant(value) }
     }
 
-    /// Columns and values of the block's unknown `k`, by column.
-    pub fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let (constant, solution, sparse) = match &self.values {
-            Values::Constant(value) => (Some(*value), None, [].as_slice()),
-            Values::Solved(solution) => (None, Some(solution), [].as_slice()),
-            Values::Sparse(rows, _) => (None, None, &rows[..]),
-        };
-        let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
-        std::iter::zip(self.columns.iter().copied(), values)
-            .chain(sparse.iter().flat_map(move |columns| columns.row(k)))
+    /// Appends columns and values of the block's unknown `k` to `out`, by column.
+    pub fn append_row(&self, k: usize, out: &mut Row) {
+        match &self.values {
+            Values::Constant(value) => out.push((self.columns[0], *value)),
+            Values::Solved(solution) => out.extend(std::iter::zip(self.columns.iter().copied(), solution.row(k))),
+            Values::Sparse(rows, _) => rows.iter().for_each(|columns| columns.append_row(k, out)),
+        }
     }
 
     /// Columns and values that solve number `solve` of a screened block has found for unknown `k`, if they were all kept.
@@ -168,10 +168,12 @@ impl<'b> BlockRows<'b> {
 
     /// The smallest value of the block's `count` unknowns.
     pub fn minimum(&self, count: usize) -> f64 {
-        if let Values::Sparse(rows, _) = &self.values {
-            return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min);
-        }
-        let least = |k| self.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+        let solution = match &self.values {
+            Values::Constant(value) => return *value,
+            Values::Sparse(rows, _) => return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min),
+            Values::Solved(solution) => solution,
+        };
+        let least = |k| solution.row(k).fold(f64::INFINITY, f64::min);
         (0..count).into_par_iter().with_min_len(256).map(least).reduce(|| f64::INFINITY, f64::min)
     }
 

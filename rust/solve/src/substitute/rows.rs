@@ -178,12 +178,12 @@ impl<'f> Layout<'f> {
             }
             let mask = entries.iter().fold(0, |mask, &(column, _)| mask | 1 << column);
             let active = active(mask);
+            let mut slots = [0; MOST_COLUMNS];
+            active.columns().zip(0..).for_each(|(column, slot)| slots[column] = slot);
             let (place, values) = builder.add(mask, places.len());
             let mut start = 0;
             for (row, end) in values.chunks_exact_mut(active.width.max(1)).zip(ends.iter()) {
-                entries[start..*end]
-                    .iter()
-                    .for_each(|&(column, value)| row[active.slot(column as usize)] += value as f32);
+                entries[start..*end].iter().for_each(|&(column, value)| row[slots[column as usize]] += value as f32);
                 start = *end;
             }
             place
@@ -305,6 +305,25 @@ impl SparseRows<'_> {
 
     /// Columns and values of one unknown, by column, without those that are not stored.
     pub fn row(&self, unknown: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let (active, values) = self.stored(unknown);
+        active.columns().map(|column| column as u32).zip(values.iter().map(|&value| f64::from(value)))
+    }
+
+    /// Calls `visit` with them.
+    pub fn for_each_in_row(&self, unknown: usize, mut visit: impl FnMut(usize, f64)) {
+        let (active, values) = self.stored(unknown);
+        let mut left = active.mask;
+        for &value in values {
+            if left == 0 {
+                break;
+            }
+            visit(left.trailing_zeros() as usize, f64::from(value));
+            left &= left - 1;
+        }
+    }
+
+    /// Columns and values of one unknown, padded.
+    fn stored(&self, unknown: usize) -> (Active, &[f32]) {
         let (front, row) = match self.tree {
             None => (0, unknown),
             Some(tree) => {
@@ -315,7 +334,6 @@ impl SparseRows<'_> {
         };
         let FrontRows { mask, values } = self.front(front);
         let active = active(mask);
-        let values = values[row * active.width..].iter().map(|&value| f64::from(value));
-        active.columns().map(|column| column as u32).zip(values)
+        (active, &values[row * active.width..][..active.width])
     }
 }
