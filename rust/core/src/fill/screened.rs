@@ -135,11 +135,12 @@ impl<'a, 'b> Screened<'a, 'b> {
 
     fn solve(&self, progress: &Progress) -> Result<BlockRows<'b>> {
         let columns = self.columns();
-        let places = Places::of(&columns).of_column;
+        let (count, places) = (columns.len(), Places::of(&columns).of_column);
         let solver = self.block.factor.sparse();
         let mut residual = 0.0;
         let solve = |(first, columns): (usize, &[u32])| {
-            let group = Group { screened: self, columns, places: &places, first, solver, progress };
+            let has_all = std::iter::zip(0.., columns).all(|(k, &column)| k == column) && columns.len() == count;
+            let group = Group { screened: self, columns, places: &places, first, has_all, solver, progress };
             let (solves, error) = group.solve()?;
             residual = f64::max(residual, error);
             Ok(SparseColumns::new(columns.to_vec(), solves, LEAST))
@@ -230,6 +231,8 @@ struct Group<'a, 'b> {
     places: &'a [u32],
     /// The place of the group's first column.
     first: usize,
+    /// Whether these are all columns there are, each in its place.
+    has_all: bool,
     solver: SparseSolver<'b>,
     progress: &'a Progress,
 }
@@ -305,6 +308,9 @@ impl<'b> Group<'_, 'b> {
     }
 
     fn append_row(&self, row: impl Iterator<Item = (u32, f64)>, factor: f64, out: &mut Vec<(u32, f64)>) {
+        if self.has_all {
+            return out.extend(row.map(|(column, value)| (column, factor * value)));
+        }
         let columns = 0..self.columns.len();
         out.extend(row.filter_map(|(column, value)| {
             let slot = (self.places[column as usize] as usize).wrapping_sub(self.first);

@@ -71,7 +71,8 @@ fn active(mask: u64) -> Active {
     Active::of::<f32>(mask)
 }
 
-const LINE: usize = <f32 as Real>::LINE;
+/// Numbers of a cache line.
+pub(crate) const LINE: usize = <f32 as Real>::LINE;
 
 /// The columns in which some of the rows, `active` ones, is more than the magnitude beside it.
 pub(crate) fn noticeable<'a>(active: Active, rows: impl Iterator<Item = (&'a [f32], f32)>) -> u64 {
