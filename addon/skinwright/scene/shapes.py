@@ -61,7 +61,8 @@ def _evaluated_source(
     with _without(off), _evaluated_mesh(shown) as (evaluated, seen):
         rows = vertex_groups.read_evaluated(evaluated, seen, names)
         if len(obj.data.polygons) and not len(seen.polygons):
-            nothing = mesh.Geometry(np.empty((0, 3), np.float32), *(np.empty((0, n), np.uint32) for n in (3, 2)))
+            triangles, wires = np.empty((0, 3), np.uint32), np.empty((0, 2), np.uint32)
+            nothing = mesh.Geometry(np.empty((0, 3), np.float32), triangles, wires)
             return Shape(nothing, np.array(shown.matrix_world), []), rows
         geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
         return Shape(geometry, np.array(shown.matrix_world), [modifier.name for modifier in off]), rows
