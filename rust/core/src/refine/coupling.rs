@@ -33,21 +33,22 @@ pub(super) fn carry_skin(local: &mut Local, before: &[Particle], share: f32) {
 
 /// Moves lattice nodes by the mean of what the skin around them moved since `before` (the skin's particles then).
 pub(super) fn carry_lattice(local: &mut Local, before: &[Particle]) {
-    let mut sums = vec![Vec4::ZERO; local.nodes];
-    for hung in &local.region.hung {
-        let vertex = hung.vertex as usize;
-        let moved = Vec4::from(local.particles[vertex]) - Vec4::from(before[vertex - local.nodes]);
-        // The fourth is the sum of the shares.
-        let moved = moved.truncate().extend(1.0);
-        for (&node, &share) in hung.nodes.iter().zip(&hung.shares) {
-            sums[node as usize] += share * moved;
+    let region = &local.region;
+    let (nodes, skin) = local.particles.split_at_mut(region.nodes);
+    let of_run = |(run, nodes): (usize, &mut [Particle])| {
+        for (n, node) in nodes.iter_mut().enumerate() {
+            let mut sum = Vec4::ZERO;
+            for &(vertex, share) in region.hung_on(run * RUN + n) {
+                let moved = Vec4::from(skin[vertex as usize]) - Vec4::from(before[vertex as usize]);
+                // The fourth is the sum of the shares.
+                sum += share * moved.truncate().extend(1.0);
+            }
+            if sum.w > 1e-6 {
+                shift(node, sum.truncate() / sum.w);
+            }
         }
-    }
-    for (node, sum) in sums.into_iter().enumerate() {
-        if sum.w > 1e-6 {
-            shift(&mut local.particles[node], sum.truncate() / sum.w);
-        }
-    }
+    };
+    nodes.par_chunks_mut(RUN).enumerate().for_each(of_run);
 }
 
 /// Particles that one task moves.

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use super::projection::{Kernel, Limits, Multipliers, OfNodes, Particle, project};
+use super::projection::{Kernel, Limits, MULTIPLIERS, Multipliers, OfNodes, Particle, project};
 use super::region::Region;
 
 /// The changing part of a frame; the region is shared with other frames.
@@ -14,7 +14,8 @@ pub(super) struct Local {
     pub(super) particles: Vec<Particle>,
     pub(super) of_edges: Multipliers<1>,
     pub(super) of_sides: Multipliers<1>,
-    pub(super) of_tetrahedra: Multipliers<2>,
+    pub(super) of_loose: Multipliers<2>,
+    pub(super) of_octahedra: Multipliers<MULTIPLIERS>,
 }
 
 impl Local {
@@ -23,7 +24,8 @@ impl Local {
             particles: region.masses.iter().map(|&w| [0.0, 0.0, 0.0, w]).collect(),
             of_edges: Multipliers::new(region.edges.len()),
             of_sides: Multipliers::new(region.sides.len()),
-            of_tetrahedra: Multipliers::new(region.tetrahedra.len()),
+            of_loose: Multipliers::new(region.loose.len()),
+            of_octahedra: Multipliers::new(region.octahedra.len()),
             region,
         }
     }
@@ -32,7 +34,8 @@ impl Local {
     pub(super) fn restart(&mut self) {
         self.of_edges.restart();
         self.of_sides.restart();
-        self.of_tetrahedra.restart();
+        self.of_loose.restart();
+        self.of_octahedra.restart();
     }
 
     /// Puts the free skin of joint `k` back within its limits.

@@ -1,6 +1,7 @@
 //! Skin in a crease, copied close together: dozens of passes go over a few thousand vertices.
 
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::constraint::{HalfSpace, self_collision};
 use super::joints::Member;
@@ -8,6 +9,9 @@ use super::local::Local;
 
 /// The side of what the plane does not concern.
 const NONE: f32 = f32::NAN;
+
+/// Vertices that one task moves.
+const RUN: usize = 1024;
 
 /// Vertices that move, then those around them, with the neighbours and the sides of the first.
 pub(super) struct Membrane {
@@ -68,11 +72,12 @@ impl Membrane {
     /// `p_i = (1 - k) p_i + k (mean of the neighbours)`, all at once (Eq. 16).
     fn pass(&mut self, plane: &HalfSpace) {
         let [child, parent, middle] = [1.0, -1.0, 0.0].map(|side| plane.heights(side));
-        let rings = self.starts.windows(2).map(|ends| &self.rings[ends[0] as usize..ends[1] as usize]);
-        for (((next, &here), &side), ring) in self.next.iter_mut().zip(&self.places).zip(&self.sides).zip(rings) {
-            let sum: Vec4 = ring.iter().map(|&n| self.places[n as usize]).sum();
+        let Self { sides, starts, rings, places, next, smoothing, .. } = self;
+        let of_one = |(k, (next, &side)): (usize, (&mut Vec4, &f32))| {
+            let (here, ring) = (places[k], &rings[starts[k] as usize..starts[k + 1] as usize]);
+            let sum: Vec4 = ring.iter().map(|&n| places[n as usize]).sum();
             let mean = sum / ring.len().max(1) as f32;
-            let by = if ring.is_empty() { Vec3::ZERO } else { (mean - here).truncate() * self.smoothing };
+            let by = if ring.is_empty() { Vec3::ZERO } else { (mean - here).truncate() * *smoothing };
             let heights = if side > 0.0 {
                 child
             } else if side < 0.0 {
@@ -83,7 +88,8 @@ impl Membrane {
             let at = here.truncate() + by;
             let back = if side.is_nan() { Vec3::ZERO } else { self_collision(plane, at, heights) };
             *next = (at + back).extend(here.w);
-        }
+        };
+        next.par_iter_mut().zip(&*sides).enumerate().with_min_len(RUN).for_each(of_one);
         std::mem::swap(&mut self.places, &mut self.next);
     }
 }

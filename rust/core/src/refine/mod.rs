@@ -6,13 +6,18 @@
 //! a walk from rest leaves none. No frame depends on another.
 
 mod balloon;
+mod clock;
 mod constraint;
 mod contact;
 mod coupling;
 mod crease;
+mod figures;
+mod finish;
 mod frame;
+mod harm;
 mod joints;
 mod lattice;
+mod limiting;
 mod local;
 mod membrane;
 mod morton;
@@ -150,7 +155,7 @@ impl Refiner {
         let in_cells =
             |&place: &[f32; 3]| ((Vec3::from(place).as_dvec3() - self.prepared.middle) / self.prepared.cell).as_vec3();
         let places: Vec<Vec3> = welded.iter().map(in_cells).collect();
-        let joints = solver::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
+        let joints = figures::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
         Ok((intersecting_pairs(&welded, &surface.triangles).len(), joints))
     }
 

@@ -1,9 +1,9 @@
-//! What the constraints calculate with: one number, or eight side by side with the same bits.
+//! What the constraints calculate with: one number, or sixteen side by side with the same bits.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Numbers side by side in one register of AVX2.
-pub const LANES: usize = 8;
+/// Numbers side by side: one register of AVX-512, two of AVX2.
+pub const LANES: usize = 16;
 
 /// The arithmetic that the constraints need. No fused operations: every implementation rounds in the same way.
 pub trait Number:
@@ -48,7 +48,7 @@ macro_rules! scalar {
 scalar!(f32);
 scalar!(f64);
 
-/// Eight numbers. Loops instead of closures, which are not compiled for the instruction set that calls them.
+/// Sixteen numbers. Loops instead of closures, which are not compiled for the instruction set that calls them.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(32))]
 pub struct Lanes(pub [f32; LANES]);

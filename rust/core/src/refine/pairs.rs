@@ -35,9 +35,9 @@ impl Slabs {
     /// How many normals are worth their tests.
     const MOST: usize = 5;
 
-    /// Along the axes and the first few of `normals`.
+    /// Along the first few of `normals`, which tell most apart and are looked at first, and the axes.
     pub(super) fn new(normals: impl IntoIterator<Item = Vec3>) -> Self {
-        Self([Vec3::X, Vec3::Y, Vec3::Z].into_iter().chain(normals.into_iter().take(Self::MOST)).collect())
+        Self(normals.into_iter().take(Self::MOST).chain([Vec3::X, Vec3::Y, Vec3::Z]).collect())
     }
 }
 

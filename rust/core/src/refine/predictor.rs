@@ -1,6 +1,6 @@
 //! Where particles go with the bones: the start of every step, and the place of what the solver leaves to the skeleton.
 
-use glam::{DAffine3, DVec3, Vec3, Vec4};
+use glam::{Affine3A, DAffine3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::constraint::{Axis, bind};
@@ -40,9 +40,14 @@ pub(super) fn linear(prepared: &Prepared, region: &Region, pose: &[DAffine3]) ->
 
 /// Puts all particles where dual quaternions say.
 pub(super) fn place_all(prepared: &Prepared, local: &mut Local, pose: &[DAffine3]) {
-    for (particle, place) in local.particles.iter_mut().zip(skinned(prepared, &local.region, pose)) {
+    let motions = Motions::new(pose);
+    let placed = |(particle, &p): (&mut [f32; 4], &u32)| {
+        let (bones, values) = prepared.weights.row(p as usize);
+        let place = motions.blended(prepared.rest[p as usize], bones, values);
         [particle[0], particle[1], particle[2]] = place.to_array();
-    }
+    };
+    let Local { region, particles, .. } = local;
+    particles.par_iter_mut().with_min_len(RUN).zip(&region.global).for_each(placed);
 }
 
 /// Puts skin near a joint that is not free about as far from the bones as at rest, as the weights' long tails would swell
@@ -83,13 +88,18 @@ pub(super) fn follow(prepared: &Prepared, local: &mut Local, before: &[DAffine3]
 struct Motions {
     exact: Vec<DualQuaternion>,
     rigid: Option<Vec<[Vec4; 2]>>,
+    /// The bones' own motions, for what one of them moves alone.
+    alone: Vec<Affine3A>,
 }
+
+/// The share of all weights from which a bone is alone.
+const ALONE: f32 = 1.0 - 1e-6;
 
 impl Motions {
     fn new(pose: &[DAffine3]) -> Self {
         let exact = motions(pose);
         let rigid = exact.iter().map(|motion| motion.rigid_parts().map(|parts| parts.map(|part| part.as_vec4())));
-        Self { rigid: rigid.collect(), exact }
+        Self { rigid: rigid.collect(), exact, alone: pose.iter().map(DAffine3::as_affine3a).collect() }
     }
 
     /// As [`blended_position`].
@@ -97,6 +107,10 @@ impl Motions {
         let Some(rigid) = &self.rigid else {
             return blended_position(position.as_dvec3(), bones, weights, &self.exact).as_vec3();
         };
+        let least = weights.iter().sum::<f32>() * ALONE;
+        if let Some(k) = weights.iter().position(|&weight| f64::from(weight) > LEAST_TOTAL_WEIGHT && weight >= least) {
+            return self.alone[bones[k] as usize].transform_point3(position);
+        }
         let (mut real, mut dual, mut total) = (Vec4::ZERO, Vec4::ZERO, 0.0);
         for (&bone, &weight) in bones.iter().zip(weights) {
             let [motion_real, motion_dual] = rigid[bone as usize];

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::contact::Contact;
 use super::joints::{Joint, joints};
-use super::lattice::Lattice;
+use super::lattice::{Lattice, Octahedra};
 use super::node_weights::particle_weights;
 use super::projection::Colouring;
 use super::region::KeptRegion;
@@ -34,6 +34,7 @@ pub(super) const ARM: f32 = 0.559_017;
 pub(super) struct Prepared {
     pub(super) surface: Surface,
     pub(super) lattice: Lattice,
+    pub(super) octahedra: Octahedra,
     pub(super) skeleton: Skeleton,
     pub(super) joints: Vec<Joint>,
     /// What intersects at rest.
@@ -46,6 +47,8 @@ pub(super) struct Prepared {
     pub(super) edge_colours: Colouring,
     pub(super) side_colours: Colouring,
     pub(super) tetrahedron_colours: Colouring,
+    pub(super) octahedron_colours: Colouring,
+    pub(super) loose_colours: Colouring,
     pub(super) edge_lengths: Vec<f32>,
     pub(super) side_lengths: Vec<f32>,
     /// What makes cells of mesh units.
@@ -91,12 +94,15 @@ impl Prepared {
         let joints = joints(&skeleton, &places, &rows, lattice.nodes.len());
         let nodes = lattice.nodes.len() as u32;
         let distance = |[i, j]: [u32; 2]| places[i as usize].distance(places[j as usize]) as f32;
+        let octahedra = Octahedra::new(&lattice.tetrahedra, &lattice.edges);
         let sides: Vec<[u32; 2]> = surface.edges.iter().map(|edge| edge.map(|i| i + nodes)).collect();
         Self {
-            edge_colours: Colouring::new(&lattice.edges, places.len()),
+            edge_colours: Colouring::new(&octahedra.edges, places.len()),
             side_colours: Colouring::new(&sides, places.len()),
             tetrahedron_colours: Colouring::new(&lattice.tetrahedra, places.len()),
-            edge_lengths: lattice.edges.iter().map(|&edge| distance(edge)).collect(),
+            octahedron_colours: Colouring::new(&octahedra.nodes, places.len()),
+            loose_colours: Colouring::new(&octahedra.loose, places.len()),
+            edge_lengths: octahedra.edges.iter().map(|&edge| distance(edge)).collect(),
             side_lengths: sides.iter().map(|&side| distance(side)).collect(),
             rest: places.iter().map(|place| place.as_vec3()).collect(),
             weights: csr(&rows, weights.n_bones()),
@@ -104,6 +110,7 @@ impl Prepared {
             kept: KeptRegion::default(),
             surface,
             lattice,
+            octahedra,
             skeleton,
             joints,
             middle,

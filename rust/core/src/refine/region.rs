@@ -8,7 +8,7 @@ use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::joints::Member;
 use super::prepared::Prepared;
-use super::projection::{Batch, Blocks, Colouring};
+use super::projection::{Batch, Blocks, Colouring, NODES};
 
 const NONE: u32 = u32::MAX;
 /// Constraints that one task looks at.
@@ -54,10 +54,18 @@ pub(super) struct Region {
     pub(super) nodes: usize,
     /// Inverse masses: 1 where free, 0 where the skeleton decides.
     pub(super) masses: Vec<f32>,
-    pub(super) edges: Batch<2, 1>,
+    /// Edges that octahedra do not keep, or not with all of their stiffness: lengths and shares.
+    pub(super) edges: Batch<2, 2>,
     pub(super) sides: Batch<2, 1>,
+    pub(super) octahedra: Batch<NODES, 0>,
+    /// Tetrahedra of no octahedron.
+    pub(super) loose: Batch<4, 0>,
+    /// All tetrahedra.
     pub(super) tetrahedra: Batch<4, 0>,
     pub(super) hung: Vec<Hung>,
+    /// The same by nodes: what hangs on each, counted from the first surface vertex, with its share.
+    held_starts: Vec<u32>,
+    held: Vec<(u32, f32)>,
     /// Members of each active joint with local indices, the free ones: nodes first, as everywhere.
     pub(super) free: Vec<Vec<Member>>,
     /// Six times the volume of each joint's region at rest, once asked for.
@@ -104,6 +112,8 @@ struct Chosen {
     edges: Vec<u32>,
     sides: Vec<u32>,
     tetrahedra: Vec<u32>,
+    loose: Vec<u32>,
+    octahedra: Vec<u32>,
     triangles: Vec<u32>,
 }
 
@@ -117,11 +127,11 @@ impl Region {
         let map = |p: u32| local[p as usize];
         let surface = |i: u32| i + prepared.node_count() as u32;
         let (lattice, skin) = (Blocks::new(0, nodes), Blocks::new(nodes, global.len() - nodes));
-        let (corners, edge_ends) = (&prepared.lattice.tetrahedra, &prepared.lattice.edges);
+        let (corners, octahedra) = (&prepared.lattice.tetrahedra, &prepared.octahedra);
         let side_ends = &prepared.surface.edges;
         let edges = || {
-            let length = |k: u32| [prepared.edge_lengths[k as usize]];
-            let ends = |k: u32| edge_ends[k as usize].map(map);
+            let length = |k: u32| [prepared.edge_lengths[k as usize], octahedra.shares[k as usize]];
+            let ends = |k: u32| octahedra.edges[k as usize].map(map);
             Batch::new(lattice, &prepared.edge_colours, &chosen.edges, ends, length)
         };
         let sides = || {
@@ -133,12 +143,24 @@ impl Region {
             let ends = |k: u32| corners[k as usize].map(map);
             Batch::new(lattice, &prepared.tetrahedron_colours, &chosen.tetrahedra, ends, |_| [])
         };
-        let ((edges, sides), tetrahedra) = rayon::join(|| rayon::join(edges, sides), tetrahedra);
+        let loose = || {
+            let ends = |k: u32| octahedra.loose[k as usize].map(map);
+            Batch::new(lattice, &prepared.loose_colours, &chosen.loose, ends, |_| [])
+        };
+        let octahedra = || {
+            let ends = |k: u32| octahedra.nodes[k as usize].map(map);
+            Batch::new(lattice, &prepared.octahedron_colours, &chosen.octahedra, ends, |_| [])
+        };
+        let (edges_and_sides, fours) = (|| rayon::join(edges, sides), || rayon::join(loose, tetrahedra));
+        let ((edges, sides), ((loose, tetrahedra), octahedra)) =
+            rayon::join(edges_and_sides, || rayon::join(fours, octahedra));
 
         let hung = global[nodes..].iter().filter_map(|&p| {
             let embedding = prepared.lattice.embedding[p as usize - prepared.node_count()]?;
             Some(Hung { vertex: map(p), nodes: embedding.nodes.map(map), shares: embedding.shares })
         });
+        let hung: Vec<Hung> = hung.collect();
+        let (held_starts, held) = by_nodes(&hung, nodes);
         let members = |chosen: &mut dyn Iterator<Item = &Member>| {
             let known = chosen.filter(|m| map(m.particle) != NONE);
             known.map(|m| Member { particle: map(m.particle), ..*m }).collect::<Vec<_>>()
@@ -153,8 +175,12 @@ impl Region {
             masses: global.iter().map(|&p| f32::from(u8::from(is_free[p as usize]))).collect(),
             edges,
             sides,
+            octahedra,
+            loose,
             tetrahedra,
-            hung: hung.collect(),
+            hung,
+            held_starts,
+            held,
             rest_volumes: free.iter().map(|_| OnceLock::new()).collect(),
             free,
             limited,
@@ -181,6 +207,11 @@ impl Region {
         &self.ring_lengths[self.ring_starts[i] as usize..self.ring_starts[i + 1] as usize]
     }
 
+    /// The surface vertices that hang on a node (counted from the first one) and their shares.
+    pub(super) fn hung_on(&self, node: usize) -> &[(u32, f32)] {
+        &self.held[self.held_starts[node] as usize..self.held_starts[node + 1] as usize]
+    }
+
     /// Whether a local particle moves freely.
     pub(super) fn is_free(&self, particle: u32) -> bool {
         self.masses[particle as usize] > 0.0
@@ -197,9 +228,11 @@ impl Chosen {
     fn new(prepared: &Prepared, is_free: &[bool]) -> Self {
         let surface = |i: u32| i + prepared.node_count() as u32;
         let any = |particles: &[u32]| particles.iter().any(|&p| is_free[p as usize]);
-        let (lattice, skin) = (&prepared.lattice, &prepared.surface);
+        let (lattice, octahedra, skin) = (&prepared.lattice, &prepared.octahedra, &prepared.surface);
         Self {
-            edges: kept(lattice.edges.len(), |k| any(&lattice.edges[k])),
+            edges: kept(octahedra.edges.len(), |k| any(&octahedra.edges[k])),
+            octahedra: kept(octahedra.nodes.len(), |k| any(&octahedra.nodes[k])),
+            loose: kept(octahedra.loose.len(), |k| any(&octahedra.loose[k])),
             sides: kept(skin.edges.len(), |k| any(&skin.edges[k].map(surface))),
             tetrahedra: kept(lattice.tetrahedra.len(), |k| any(&lattice.tetrahedra[k])),
             triangles: kept(skin.triangles.len(), |k| any(&skin.triangles[k].map(surface))),
@@ -212,7 +245,8 @@ impl Chosen {
         let surface = |i: u32| i as usize + nodes;
         let mut takes_part = is_free.to_vec();
         let mut mark = |p: usize| takes_part[p] = true;
-        self.edges.iter().flat_map(|&k| prepared.lattice.edges[k as usize]).for_each(|p| mark(p as usize));
+        self.octahedra.iter().flat_map(|&k| prepared.octahedra.nodes[k as usize]).for_each(|p| mark(p as usize));
+        self.loose.iter().flat_map(|&k| prepared.octahedra.loose[k as usize]).for_each(|p| mark(p as usize));
         self.sides.iter().flat_map(|&k| prepared.surface.edges[k as usize]).for_each(|i| mark(surface(i)));
         self.triangles.iter().flat_map(|&k| prepared.surface.triangles[k as usize]).for_each(|i| mark(surface(i)));
         // Skin beyond a limb's region is kept near its bones as well, all of it.
@@ -235,6 +269,21 @@ impl Chosen {
 /// The numbers below `count` that `keep` accepts, ascending.
 fn kept(count: usize, keep: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
     (0..count).into_par_iter().with_min_len(RUN).filter(|&k| keep(k)).map(|k| k as u32).collect()
+}
+
+/// Where each of `nodes` nodes begins, and the vertices that hang on it, ascending.
+fn by_nodes(hung: &[Hung], nodes: usize) -> (Vec<u32>, Vec<(u32, f32)>) {
+    let mut starts = vec![0u32; nodes + 1];
+    hung.iter().flat_map(|hung| hung.nodes).for_each(|node| starts[node as usize + 1] += 1);
+    (0..nodes).for_each(|node| starts[node + 1] += starts[node]);
+    let (mut next, mut held) = (starts.clone(), vec![(0, 0.0); 4 * hung.len()]);
+    for hung in hung {
+        for (&node, &share) in hung.nodes.iter().zip(&hung.shares) {
+            held[next[node as usize] as usize] = (hung.vertex - nodes as u32, share);
+            next[node as usize] += 1;
+        }
+    }
+    (starts, held)
 }
 
 /// The distance at rest between each surface vertex and each neighbour.

@@ -73,11 +73,12 @@ pub(super) fn kept(
 
 /// Half the L1 distance of two rows that sum to one: what either has more than the other.
 fn half_l1(first: &[(u32, f64)], second: &[(u32, f64)]) -> f64 {
-    let mut second = second.iter().copied().peekable();
-    let mut more = 0.0;
+    let (mut at, mut more) = (0, 0.0);
     for &(column, value) in first {
-        while second.next_if(|&(other, _)| other < column).is_some() {}
-        let shared = second.next_if(|&(other, _)| other == column).map_or(0.0, |(_, value)| value);
+        while at < second.len() && second[at].0 < column {
+            at += 1;
+        }
+        let shared = second.get(at).filter(|&&(other, _)| other == column).map_or(0.0, |&(_, value)| value);
         more += (value - shared).max(0.0);
     }
     more

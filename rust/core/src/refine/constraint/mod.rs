@@ -11,8 +11,12 @@ mod stretch;
 mod volume;
 
 pub use bind::{Axis, bind};
+#[cfg(test)]
 pub use energy::energy;
+pub use energy::project_energy;
 pub use self_collision::{HalfSpace, self_collision};
+pub use stretch::project_stretch;
+#[cfg(test)]
 pub use stretch::stretch;
 pub use volume::volume;
 

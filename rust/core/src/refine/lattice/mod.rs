@@ -3,6 +3,7 @@
 //! Inside is where the generalised winding number exceeds a half, so that open, overlapping and non-manifold meshes work.
 
 mod clones;
+mod octahedra;
 mod raster;
 mod tetrahedron;
 
@@ -10,6 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::clones::{Element, joined_corners, pieces};
+pub(super) use self::octahedra::Octahedra;
 use self::raster::{Crossing, crossings};
 use self::tetrahedron::{Point, Tetrahedron, place};
 use super::morton::morton;

@@ -1,7 +1,7 @@
 //! Particles halved again and again: what lies within one half can be projected while another thread does the other.
 
 /// Particles of a block that is not halved.
-const SMALLEST: usize = 1024;
+const SMALLEST: usize = 2048;
 /// Most blocks: each halving leaves constraints between the halves, which wait for both.
 const MOST: usize = 32;
 

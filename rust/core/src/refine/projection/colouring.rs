@@ -1,4 +1,4 @@
-//! Colours, so that constraints of one share no particle and eight can be projected side by side.
+//! Colours, so that constraints of one share no particle and sixteen can be projected side by side.
 
 /// Colours there are. Constraints for which none is left are projected one by one.
 const MOST: u32 = 128;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop)]
 
-use super::super::constraint::{Constraint, energy, stretch, volume};
+use super::super::constraint::{Constraint, Projection, project_energy, project_stretch, volume};
 use super::super::number::{Number, Vector, add};
 
 /// Constraints over `N` particles with `M` numbers at rest and `L` multipliers.
@@ -18,7 +18,26 @@ pub struct Stretch(pub f32);
 impl Kind<2, 1, 1> for Stretch {
     #[inline(always)]
     fn project<T: Number>(self, places: &mut [Vector<T>; 2], w: [T; 2], [length]: [T; 1], multipliers: &mut [T; 1]) {
-        apply(stretch(*places, length), places, w, length.constant(self.0), &mut multipliers[0]);
+        let step = project_stretch(*places, w, length, length.constant(self.0), multipliers[0]);
+        apply(step, places, &mut multipliers[0]);
+    }
+}
+
+/// The same of edges whose stiffness is shared with others; the second number at rest is their share.
+#[derive(Debug, Clone, Copy)]
+pub struct PartOfStretch(pub f32);
+
+impl Kind<2, 2, 1> for PartOfStretch {
+    #[inline(always)]
+    fn project<T: Number>(
+        self,
+        places: &mut [Vector<T>; 2],
+        w: [T; 2],
+        [length, share]: [T; 2],
+        multipliers: &mut [T; 1],
+    ) {
+        let step = project_stretch(*places, w, length, length.constant(self.0) / share, multipliers[0]);
+        apply(step, places, &mut multipliers[0]);
     }
 }
 
@@ -42,11 +61,12 @@ impl Kind<4, 0, 2> for Flesh {
         let any = w[0];
         if let Some(compliance) = self.volume_compliance {
             let constraint = volume(*places, any.constant(self.volume));
-            apply(constraint, places, w, any.constant(compliance), &mut multipliers[0]);
+            apply(constraint.project(w, any.constant(compliance), multipliers[0]), places, &mut multipliers[0]);
         }
         if let Some(compliance) = self.energy_compliance {
-            let constraint = energy(*places, [any.constant(self.arm); 4]);
-            apply(constraint, places, w, any.constant(compliance), &mut multipliers[1]);
+            let arms = [any.constant(self.arm); 4];
+            let step = project_energy(*places, w, arms, any.constant(compliance), multipliers[1]);
+            apply(step, places, &mut multipliers[1]);
         }
     }
 }
@@ -61,7 +81,7 @@ impl Kind<4, 0, 0> for Fill {
         let zero = w[0].constant(0.0);
         let Constraint { value, gradient } = volume(*places, w[0].constant(self.0));
         let one_sided = Constraint { value: value.lesser(zero), gradient };
-        apply(one_sided, places, w, zero, &mut zero.constant(0.0));
+        apply(one_sided.project(w, zero, zero), places, &mut zero.constant(0.0));
     }
 }
 
@@ -83,14 +103,11 @@ impl Measure<4> for Thin {
 }
 
 #[inline(always)]
-fn apply<T: Number, const N: usize>(
-    constraint: Constraint<T, N>,
+pub(super) fn apply<T: Number, const N: usize>(
+    step: Projection<T, N>,
     places: &mut [Vector<T>; N],
-    w: [T; N],
-    compliance: T,
     multiplier: &mut T,
 ) {
-    let step = constraint.project(w, compliance, *multiplier);
     for n in 0..N {
         places[n] = add(places[n], step.moves[n]);
     }

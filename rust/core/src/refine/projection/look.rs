@@ -1,16 +1,20 @@
-//! Looking for constraints that a measure finds below zero, eight side by side as the sweeps go.
+//! Looking for constraints that a measure finds below zero, sixteen side by side as the sweeps go.
 
 // Indices are constants after unrolling; iterators over them are not inlined across instruction sets.
 #![allow(clippy::needless_range_loop)]
 
 use std::ops::Range;
 
-use super::super::number::{LANES, Lanes};
+use super::super::number::LANES;
+#[cfg(not(target_arch = "x86_64"))]
+use super::super::number::Lanes;
+#[cfg(target_arch = "x86_64")]
+use super::With;
 use super::batch::{Batch, Particle};
 use super::kind::Measure;
 use super::register::Register;
 #[cfg(target_arch = "x86_64")]
-use super::wide::Wide;
+use super::wide::{Wide, Widest};
 use super::{Kernel, indices};
 
 /// Calls `found` with those of `range`, ascending, whose measure is below zero.
@@ -40,14 +44,22 @@ struct Look<'a, F, G, const N: usize, const M: usize> {
 impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> Look<'_, F, G, N, M> {
     fn side_by_side(self) {
         #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
-            return pulp::Simd::vectorize(simd, WithWide { simd, look: self });
+        {
+            if let Some(simd) = pulp::x86::V4::try_new() {
+                return pulp::Simd::vectorize(simd, With::<Widest, _>(simd, self));
+            }
+            if let Some(simd) = pulp::x86::V3::try_new() {
+                return pulp::Simd::vectorize(simd, With::<Wide, _>(simd, self));
+            }
         }
-        self.eights::<Lanes>(());
+        #[cfg(target_arch = "x86_64")]
+        self.one_by_one();
+        #[cfg(not(target_arch = "x86_64"))]
+        self.side_by_side_in::<Lanes>(());
     }
 
     #[inline(always)]
-    fn eights<R: Register>(mut self, proof: R::Proof) {
+    fn side_by_side_in<R: Register>(mut self, proof: R::Proof) {
         for from in self.range.clone().step_by(LANES) {
             let count = LANES.min(self.range.end - from);
             let (mut places, mut any) = ([[R::load(proof, &[0.0; LANES]); 3]; N], R::load(proof, &[0.0; LANES]));
@@ -79,17 +91,16 @@ impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> Look<'_, F,
 }
 
 #[cfg(target_arch = "x86_64")]
-struct WithWide<'a, F, G, const N: usize, const M: usize> {
-    simd: pulp::x86::V3,
-    look: Look<'a, F, G, N, M>,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl<F: Measure<N>, G: FnMut(usize), const N: usize, const M: usize> pulp::WithSimd for WithWide<'_, F, G, N, M> {
+impl<R, F, G, const N: usize, const M: usize> pulp::WithSimd for With<R, Look<'_, F, G, N, M>>
+where
+    R: Register,
+    F: Measure<N>,
+    G: FnMut(usize),
+{
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _simd: S) {
-        self.look.eights::<Wide>(self.simd);
+        self.1.side_by_side_in::<R>(self.0);
     }
 }

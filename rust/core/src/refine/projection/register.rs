@@ -1,20 +1,20 @@
-//! Eight numbers side by side, as the sweeps take them: in a register where the machine has one, else in an array.
+//! Sixteen numbers side by side, as the sweeps take them: in a register where the machine has one, else in an array.
 
 #![allow(clippy::needless_range_loop)]
 
 use super::super::number::{LANES, Lanes, Number, Vector};
 use super::batch::Particle;
 
-/// Eight numbers that come from columns and from the rows of particles.
+/// Sixteen numbers that come from columns and from the rows of particles.
 pub(super) trait Register: Number {
     /// The proof that the machine has the instructions.
     type Proof: Copy;
 
     fn load(proof: Self::Proof, column: &[f32; LANES]) -> Self;
     fn store(self, column: &mut [f32; LANES]);
-    /// Eight places and inverse masses.
+    /// Sixteen places and inverse masses.
     fn gather(proof: Self::Proof, particles: &[Particle], at: &[u32; LANES]) -> (Vector<Self>, Self);
-    /// Writes the first `count` of eight places; masses stay.
+    /// Writes the first `count` of sixteen places; masses stay.
     fn scatter(places: Vector<Self>, masses: Self, particles: &mut [Particle], at: &[u32; LANES], count: usize);
 }
 

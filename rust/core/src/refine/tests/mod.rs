@@ -4,10 +4,15 @@ mod sweeps;
 
 use glam::Vec3;
 
-use super::constraint::{Axis, HalfSpace, bind, energy, self_collision, stretch, volume};
+use super::constraint::{
+    Axis, Constraint, HalfSpace, Projection, bind, energy, project_energy, project_stretch, self_collision, stretch,
+    volume,
+};
+use super::lattice::Octahedra as Grouped;
 use super::pairs::{Slabs, intersecting_pairs_of};
 use super::projection::{
-    Batch, Blocks, Colouring, Flesh, Kernel, Kind, Limits, Multipliers, OfNodes, Particle, Stretch, project,
+    Batch, Blocks, Colouring, Flesh, Kernel, Kind, Limits, Multipliers, Octahedra, OfNodes, PartOfStretch, Particle,
+    Stretch, project,
 };
 
 const CORNERS: [[f64; 3]; 4] = [[0.1, 0.2, -0.1], [1.3, 0.0, 0.2], [0.2, 0.9, 0.1], [-0.1, 0.3, 1.4]];
@@ -40,6 +45,95 @@ fn gradients_are_derivatives() {
     assert_close(volume(CORNERS, 0.1).gradient, differences(CORNERS, |p| volume(p, 0.1).value));
     let arms = [0.5, 0.8, 0.6, 0.9];
     assert_close(energy(CORNERS, arms).gradient, differences(CORNERS, |p| energy(p, arms).value));
+}
+
+fn assert_same<const N: usize>(found: Projection<f64, N>, expected: Projection<f64, N>) {
+    assert_close(found.moves, expected.moves);
+    assert!((found.multiplier - expected.multiplier).abs() < 1e-9);
+}
+
+#[test]
+fn projections_with_one_division_are_those_of_value_and_gradient() {
+    let (four, two) = ([1.0, 0.0, 1.0, 0.5], [1.0, 0.5]);
+    for (alpha, multiplier) in [(0.0, 0.0), (0.5, 0.0), (10.0, -0.2), (3.0, 0.7)] {
+        let ends = [CORNERS[0], CORNERS[1]];
+        let edge: Constraint<f64, 2> = stretch(ends, 0.7);
+        assert_same(project_stretch(ends, two, 0.7, alpha, multiplier), edge.project(two, alpha, multiplier));
+        let arms = [0.5, 0.8, 0.6, 0.9];
+        let springs = energy(CORNERS, arms);
+        assert_same(project_energy(CORNERS, four, arms, alpha, multiplier), springs.project(four, alpha, multiplier));
+    }
+    let still = project_energy(
+        [[0.5, 0.5, 0.5], [0.5, -0.5, -0.5], [-0.5, 0.5, -0.5], [-0.5, -0.5, 0.5]],
+        [1.0; 4],
+        [0.75f64.sqrt(); 4],
+        0.0,
+        0.0,
+    );
+    assert!(still.moves.as_flattened().iter().all(|x| x.abs() < 1e-9));
+    let nowhere = project_stretch([[0.0; 3]; 2], [1.0; 2], 1.0, 0.0, 0.0);
+    assert_eq!(nowhere.moves, [[0.0; 3]; 2]);
+}
+
+/// The octahedra between the cubes of a block, as tetrahedra, some of which are left out.
+fn tetrahedra_of_a_block() -> (Vec<[i32; 3]>, Vec<[u32; 4]>) {
+    let mut points: Vec<[i32; 3]> = Vec::new();
+    let mut tetrahedra = Vec::new();
+    for cube in (0..64).map(|k| [k % 4, k / 4 % 4, k / 16]) {
+        for axis in 0..3 {
+            let centre = cube.map(|x| 2 * x + 1);
+            let mut other = centre;
+            other[axis] += 2;
+            let ring = [(-1, -1), (1, -1), (1, 1), (-1, 1)].map(|(u, v)| {
+                let mut point = centre;
+                point[axis] += 1;
+                point[(axis + 1) % 3] += u;
+                point[(axis + 2) % 3] += v;
+                point
+            });
+            for k in (0..4).filter(|k| (cube[0] + 2 * cube[1] + k) % 11 != 0) {
+                let [from, to] = if cube[2] % 2 == 0 { [k, k + 1] } else { [k + 1, k] };
+                let corners = [centre, other, ring[from as usize % 4], ring[to as usize % 4]];
+                tetrahedra.push(corners.map(|corner| {
+                    points.iter().position(|&p| p == corner).unwrap_or_else(|| {
+                        points.push(corner);
+                        points.len() - 1
+                    }) as u32
+                }));
+            }
+        }
+    }
+    (points, tetrahedra)
+}
+
+#[test]
+fn octahedra_and_what_is_left_hold_every_tetrahedron_once_and_all_of_every_edge() {
+    let (_, tetrahedra) = tetrahedra_of_a_block();
+    let pairs = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let sides = |t: &[u32; 4]| pairs.map(|[i, j]| [t[i].min(t[j]), t[i].max(t[j])]);
+    let mut edges: Vec<[u32; 2]> = tetrahedra.iter().flat_map(sides).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    let grouped = Grouped::new(&tetrahedra, &edges);
+    let ring = |o: &[u32; 6]| [[o[2], o[3]], [o[3], o[4]], [o[4], o[5]], [o[5], o[2]]];
+    let of_one = |o: &[u32; 6]| ring(o).map(|[c, d]| [o[0], o[1], c, d]);
+    let mut all: Vec<[u32; 4]> = grouped.nodes.iter().flat_map(of_one).chain(grouped.loose.iter().copied()).collect();
+    assert!(grouped.nodes.len() > 50 && grouped.loose.len() > 20);
+    let mut expected = tetrahedra.clone();
+    all.sort_unstable();
+    expected.sort_unstable();
+    assert_eq!(all, expected);
+    let mut stiffness = vec![0.0f32; edges.len()];
+    let mut add = |i: u32, j: u32, share: f32| {
+        stiffness[edges.binary_search(&[i.min(j), i.max(j)]).unwrap()] += share;
+    };
+    for o in &grouped.nodes {
+        add(o[0], o[1], 1.0);
+        ring(o).iter().for_each(|&[c, d]| add(c, d, 0.25));
+        (2..6).for_each(|k| [0, 1].iter().for_each(|&end| add(o[end], o[k], 1.0 / 3.0)));
+    }
+    grouped.edges.iter().zip(&grouped.shares).for_each(|(&[i, j], &share)| add(i, j, share));
+    assert!(stiffness.iter().all(|&s| (s - 1.0).abs() < 1e-2), "{stiffness:?}");
 }
 
 #[test]
@@ -82,7 +176,7 @@ fn limited<const M: usize, K: Kind<1, M, 0>>(kind: K, at: Vec3, rest: [f32; M]) 
 }
 
 #[test]
-fn limits_of_eight_lanes_are_bind_and_plane_one_after_the_other() {
+fn limits_of_lanes_are_bind_and_plane_one_after_the_other() {
     let axis = Axis { origin: Vec3::new(0.1, -0.2, 0.0), directions: [-Vec3::X, Vec3::new(0.6, 0.8, 0.0)] };
     let plane = HalfSpace { origin: axis.origin, normal: Vec3::new(0.8, 0.6, 0.0), gap: 0.05 };
     let (most, limits) = (1.1, Limits::new(&axis, Some(&plane), 1.1));
@@ -139,18 +233,26 @@ fn lanes_on_any_number_of_threads_have_the_bits_of_the_scalar_twin() {
     let twos: Vec<[u32; 2]> = (0..5000).map(|k| [corner(k, 0), corner(k, 1)]).collect();
     let blocks = Blocks::new(0, count as usize);
     let (of_fours, of_twos) = (Colouring::new(&fours, count as usize), Colouring::new(&twos, count as usize));
+    let sixes: Vec<[u32; 6]> = (0..5000).map(|k| [0, 1, 2, 3, 4, 5].map(|n| corner(k, n))).collect();
+    let of_sixes = Colouring::new(&sixes, count as usize);
     let all: Vec<u32> = (0..5000).collect();
     let run = |kernel, threads: usize| {
         let mut particles = particles.clone();
         let edges = Batch::new(blocks, &of_twos, &all, |k| twos[k as usize], |_| [0.3]);
+        let parts = Batch::new(blocks, &of_twos, &all, |k| twos[k as usize], |k| [0.4, 0.25 + (k % 3) as f32 / 4.0]);
         let tetrahedra = Batch::new(blocks, &of_fours, &all, |k| fours[k as usize], |_| []);
+        let octahedra = Batch::new(blocks, &of_sixes, &all, |k| sixes[k as usize], |_| []);
         let mut multipliers = (Multipliers::new(edges.len()), Multipliers::new(tetrahedra.len()));
+        let (mut of_parts, mut of_octahedra) = (Multipliers::new(parts.len()), Multipliers::new(octahedra.len()));
         let flesh = Flesh { volume: 0.02, arm: 0.3, volume_compliance: Some(0.0005), energy_compliance: Some(2.0) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             for _ in 0..3 {
                 project(kernel, Stretch(1.0), &edges, &mut multipliers.0, &mut particles);
+                project(kernel, PartOfStretch(0.5), &parts, &mut of_parts, &mut particles);
                 project(kernel, flesh, &tetrahedra, &mut multipliers.1, &mut particles);
+                let kind = Octahedra { flesh, stretch_compliance: Some(1.0) };
+                project(kernel, kind, &octahedra, &mut of_octahedra, &mut particles);
             }
         });
         particles.into_flattened().into_iter().map(f32::to_bits).collect::<Vec<_>>()
