@@ -210,7 +210,8 @@ def _keeps_its_faces(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> bo
         seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         if len(seen.vertices) != len(obj.data.vertices):
             return False
-        return all(map(np.array_equal, faces.around(seen), faces.around(obj.data)))
+        pairs = zip(faces.around(seen), faces.around(obj.data), strict=True)
+        return all(np.array_equal(there, here) for there, here in pairs)
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:
