@@ -210,8 +210,8 @@ def _keeps_its_faces(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> bo
         seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         if len(seen.vertices) != len(obj.data.vertices):
             return False
-        pairs = zip(faces.around(seen), faces.around(obj.data), strict=True)
-        return all(np.array_equal(there, here) for there, here in pairs)
+        there, here = faces.around(seen), faces.around(obj.data)
+        return len(there) == len(here) and all(np.array_equal(a, b) for a, b in zip(there, here, strict=True))
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:
