@@ -68,7 +68,7 @@ pub struct Screen<'a> {
     /// The [table](super::Fill::row_table) of the given rows.
     pub rows: &'a RowTable,
     /// Share of the change of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's
-    /// rows, (V).
+    /// rows, (V); where both ends have a list, that of the lower index counts.
     pub kept: &'a Ragged<f64>,
     /// If this is only a part of a problem.
     pub patch: Option<Patch<'a>>,
@@ -212,6 +212,13 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
     let (neighbours, cotangents) = given.laplacian.row(i);
     for ((&j, cotangent), share) in std::iter::zip(std::iter::zip(neighbours, cotangents), given.screen.kept.of(i)) {
         let there = given.screen.rows.of(j as usize);
+        let share = match given.screen.kept.of(j as usize) {
+            theirs if (j as usize) < i && !theirs.is_empty() => {
+                let back = given.laplacian.neighbours(j as usize).iter().position(|&back| back as usize == i);
+                back.map_or(0.0, |at| theirs[at])
+            }
+            _ => *share,
+        };
         if cotangent * share == 0.0 || there.is_empty() || there == given.screen.rows.of(i) {
             continue;
         }
