@@ -36,9 +36,8 @@ const DOUBTFUL: f64 = 1e-4;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
-/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+/// Blocks with more unknowns than this collect some rows twice instead of holding them, for the sake of memory.
 const MANY: usize = 300_000;
-const FEWER_COLUMNS: usize = 16;
 
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
@@ -145,8 +144,7 @@ impl<'a, 'b> Screened<'a, 'b> {
             residual = f64::max(residual, error);
             Ok(SparseColumns::new(columns.to_vec(), solves, LEAST))
         };
-        let together = if self.count() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
-        let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
+        let groups = std::iter::zip((0..).step_by(MOST_COLUMNS), columns.chunks(MOST_COLUMNS));
         let found = groups.map(solve).collect::<Result<_>>()?;
         Ok(BlockRows::sparse(found, residual))
     }
