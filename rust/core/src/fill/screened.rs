@@ -36,9 +36,8 @@ const DOUBTFUL: f64 = 1e-4;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
-/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+/// Blocks with more unknowns than this collect some rows twice instead of holding them, for the sake of memory.
 const MANY: usize = 300_000;
-const FEWER_COLUMNS: usize = 16;
 
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
@@ -68,7 +67,7 @@ pub struct Screen<'a> {
     /// The [table](super::Fill::row_table) of the given rows.
     pub rows: &'a RowTable,
     /// Share of the change of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's
-    /// rows, (V).
+    /// rows, (V); where both ends have a list, that of the lower index counts.
     pub kept: &'a Ragged<f64>,
     /// If this is only a part of a problem.
     pub patch: Option<Patch<'a>>,
@@ -145,8 +144,7 @@ impl<'a, 'b> Screened<'a, 'b> {
             residual = f64::max(residual, error);
             Ok(SparseColumns::new(columns.to_vec(), solves, LEAST))
         };
-        let together = if self.count() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
-        let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
+        let groups = std::iter::zip((0..).step_by(MOST_COLUMNS), columns.chunks(MOST_COLUMNS));
         let found = groups.map(solve).collect::<Result<_>>()?;
         Ok(BlockRows::sparse(found, residual))
     }
@@ -212,6 +210,13 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
     let (neighbours, cotangents) = given.laplacian.row(i);
     for ((&j, cotangent), share) in std::iter::zip(std::iter::zip(neighbours, cotangents), given.screen.kept.of(i)) {
         let there = given.screen.rows.of(j as usize);
+        let share = match given.screen.kept.of(j as usize) {
+            theirs if (j as usize) < i && !theirs.is_empty() => {
+                let back = given.laplacian.neighbours(j as usize).iter().position(|&back| back as usize == i);
+                back.map_or(0.0, |at| theirs[at])
+            }
+            _ => *share,
+        };
         if cotangent * share == 0.0 || there.is_empty() || there == given.screen.rows.of(i) {
             continue;
         }

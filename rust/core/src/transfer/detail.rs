@@ -41,8 +41,9 @@ impl Place {
     }
 }
 
-/// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V). `rows` are the source's, empty
-/// where none is asked for; only soft vertices keep anything.
+/// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V); of two soft vertices the one
+/// with the lower index has it, and the other has 0. `rows` are the source's, empty where none is asked for; only soft
+/// vertices keep anything.
 pub(super) fn kept(
     source: &Source,
     matches: &Matches,
@@ -64,6 +65,9 @@ pub(super) fn kept(
         let Constraint::Soft(_) = constraints[i] else { return };
         let here = mesh.position(i as u32);
         shares.extend(laplacian.neighbours(i).iter().map(|&j| {
+            if (j as usize) < i && matches!(constraints[j as usize], Constraint::Soft(_)) {
+                return 0.0;
+            }
             let length = here.distance(mesh.position(j));
             let steepness = half_l1(rows.of(i), rows.of(j as usize)) * source.size() / length.max(f64::MIN_POSITIVE);
             places[i].trust(&places[j as usize], length, source.size()) / (1.0 + (steepness / STEEP).powi(2))
