@@ -241,7 +241,8 @@ class Refiner:
 
     def measure(self, pose_from_rest: ArrayLike, positions: ArrayLike) -> dict[str, Any]:
         """Figures of positions (V, 3) that anybody made in a pose: "pairs" that intersect, and for each joint that
-        turns its "bone", "volume" against rest (-0.02: 2 % lost) and "bulge" as a multiple of rest."""
+        turns its "bone", "volume" against rest (-0.02: 2 % lost; None beside a trunk, as at shoulders) and "bulge" as a
+        multiple of rest."""
 
     def report(self) -> dict[str, Any] | None:
         """Figures of the pose solved last, which is solved once more for them; None before the first."""

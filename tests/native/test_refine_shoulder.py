@@ -55,3 +55,4 @@ def test_a_shoulder_leaves_the_chest_where_it_is(figure, degrees, quality):
     chest = (weights[:, 2] == 0) & (away > 8)
     assert chest.sum() > 500
     assert np.abs(moved - places)[chest].max() < 0.5
+    assert [joint["volume"] for joint in refiner.measure(turned(degrees), moved)["joints"]] == [None]

@@ -336,3 +336,11 @@ def test_what_keeps_the_weights_from_moving_the_mesh_is_named(addon, legs, rig):
     legs.matrix_parent_inverse = (rig.matrix_world @ rig.pose.bones["Hips"].matrix).inverted()
     run(legs, rig, resolution=32)
     assert any("is parented to the bone Hips of" in text for text in addon.reporting.last.warnings)
+
+
+def test_a_mask_that_would_be_overwritten_is_refused(legs, rig):
+    legs.vertex_groups.new(name="Leg.L").add([0, 1, 2], 0.5, "REPLACE")
+    builders.select(legs, rig)
+    with pytest.raises(RuntimeError, match="The mask of Legs is its group Leg.L, which would be overwritten"):
+        bpy.ops.skinwright.automatic_weights(resolution=32, mask_group="Leg.L")
+    assert [group.name for group in legs.vertex_groups] == ["Leg.L"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from transferring import said
 
+Matrix = pytest.importorskip("mathutils", reason="needs the bpy wheel").Matrix
 bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 
 pytestmark = pytest.mark.usefixtures("native", "scene")
@@ -48,6 +49,35 @@ class TestBody:
         report = plain(legs, target, source_scope=scope)
         assert report.source == "Legs + Torso"
         assert builders.dense(target, figure.BONES) == pytest.approx(expected, abs=1e-3)
+
+    @pytest.mark.parametrize("shaped", ["key", "lattice", "half legs", "half torso"])
+    def test_parts_continue_each_other_as_they_are_shown(self, plain, parts, shaped):
+        """The raw meshes have no border in common: a key or a lattice brings one to its place, or it is a half."""
+        legs, torso, expected = parts
+        if shaped == "key":
+            legs.shape_key_add(name="Basis", from_mix=False)
+            legs.shape_key_add(name="Fitted", from_mix=False).value = 1
+            for point in legs.data.shape_keys.key_blocks["Basis"].data:
+                point.co.z -= 0.4
+        elif shaped == "lattice":
+            cage = bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage"))
+            bpy.context.collection.objects.link(cage)
+            cage.scale = (4, 4, 4)
+            for point in cage.data.points:
+                point.co_deform.z += 0.1
+            legs.data.transform(Matrix.Translation((0, 0, -0.4)))
+            legs.modifiers.new("Cage", "LATTICE").object = cage
+            legs.modifiers.move(1, 0)
+        else:
+            obj = legs if shaped == "half legs" else torso
+            left = figure.part(obj, "Left", lambda centre: centre[0] >= 0)
+            for modifier in (left.modifiers.new("Mirror", "MIRROR"), figure.bind(left, obj.modifiers[0].object)):
+                modifier.show_render = True
+            bpy.data.objects.remove(obj)
+            legs, torso = (left, torso) if shaped == "half legs" else (legs, left)
+        target = overall()
+        assert plain(legs, target).source == f"{legs.name} + {torso.name}"
+        assert np.abs(builders.dense(target, figure.BONES) - expected).mean() < 0.02
 
     def test_the_source_alone(self, plain, parts):
         legs, _, expected = parts

@@ -201,6 +201,18 @@ def test_a_rig_that_rides_on_a_bone_carries_all_alike(plain, body, rig, boot):
     assert "Horse" not in said(plain(body, boot))
 
 
+@pytest.mark.parametrize("along", [False, True])
+def test_a_pose_that_carries_the_body_alone_is_named(plain, body, rig, boot, along):
+    """At rest the body lies elsewhere than where the boot was fitted to it."""
+    horse = figure.bones({"Back": ((1, 0, 1), (1, 0, 1.3), None)}, "Horse")
+    for obj in (rig, boot) if along else (rig,):
+        obj.parent, obj.parent_type, obj.parent_bone = horse, "BONE", "Back"
+        obj.matrix_parent_inverse = (horse.matrix_world @ horse.pose.bones["Back"].matrix).inverted()
+    body.parent = rig
+    figure.turn(horse, "Back", 5)
+    assert ("Horse is posed, and shapes in rest pose were compared" in said(plain(body, boot))) != along
+
+
 @pytest.mark.parametrize("in_renders", [True, False])
 def test_a_hidden_armature_of_another_rig_is_none(plain, body, rig, boot, in_renders):
     before = figure.rest(boot)

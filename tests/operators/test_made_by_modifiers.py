@@ -62,8 +62,9 @@ def test_a_body_without_faces_or_weights_is_taken_as_it_was_before(plain, body, 
 
 
 def test_nodes_that_keep_the_weights_count(plain, body, boot):
+    """Blender 4.2 loses groups where it makes instances real."""
     nodes(body, "GeometryNodeGeometryToInstance", "GeometryNodeRealizeInstances")
-    assert said(plain(body, boot)) == ""
+    assert ("With the modifier Maker" in said(plain(body, boot))) == (bpy.app.version < (4, 3))
 
 
 class TestVerticesInAnotherOrder:

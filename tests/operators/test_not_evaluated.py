@@ -47,6 +47,17 @@ def test_a_body_that_hangs_on_a_moved_parent(plain, body, rig, boot, how):
 
 
 @pytest.mark.parametrize("how", HIDING)
+def test_the_list_of_objects_can_be_gone_through_afterwards(addon, body, how):
+    """Blender frees the list when next it needs it: whoever is going through it then crashes."""
+    put_away(how, body)
+    for number in range(50):
+        bpy.context.collection.objects.link(bpy.data.objects.new(f"Empty {number}", None))
+    addon.scene.evaluation.bring_up_to_date([body])
+    assert sum(obj.visible_get() for obj in bpy.context.view_layer.objects) > 50
+    assert body not in [obj for obj in bpy.context.view_layer.objects if obj.visible_get()]
+
+
+@pytest.mark.parametrize("how", HIDING)
 def test_a_file_that_was_just_loaded(plain, body, boot, how, tmp_path):
     body.location.x = boot.location.x = body.modifiers[0].object.location.x = 5
     put_away(how, body)

@@ -101,6 +101,7 @@ def test_removing_leaves_no_trace(addon):
     bpy.ops.skinwright.bake_correctives(samples=2)
     record = json.loads(obj["skinwright_refine"])
     assert record["keys"] and all(c["pairs_after"] <= c["pairs_before"] for c in record["certificates"])
+    assert all(abs(c["volume_after"]) < 0.05 for c in record["certificates"])
     assert bpy.ops.skinwright.remove_correctives() == {"FINISHED"}
     assert obj.data.shape_keys is None
     assert (set(obj.keys()), [m.name for m in obj.modifiers]) == before

@@ -121,6 +121,14 @@ def test_one_that_changes_nothing_is_not_named(plain, body, rig, boot):
     assert said(plain(body, boot)) == ""
 
 
+def test_fine_relief_after_the_armature_is_not_named(plain, body, rig, boot):
+    """Wrinkles of a millimetre slide a little as it moves, and that is usual."""
+    figure.bind(boot, rig)
+    relief = boot.modifiers.new("Relief", "DISPLACE")
+    relief.texture, relief.strength = bpy.data.textures.new("Noise", "CLOUDS"), 0.001
+    assert said(plain(body, boot)) == ""
+
+
 def test_of_the_body_it_is_named(plain, body, boot):
     taper(body)
     assert "Fit of Body comes after the armature" in said(plain(body, boot))

@@ -326,3 +326,14 @@ def test_an_object_without_a_place_in_the_scene(plain, body):
     loose = bpy.data.objects.new("Loose", builders.grid("Made", 4).data.copy())
     plain(body, loose)
     assert builders.dense(loose, BONES).sum(1) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_a_mask_that_would_be_overwritten(coat, locked):
+    """It would steer once and be gone; a locked group stays."""
+    coat.skinwright.mask_group = "Arm.L"
+    coat.vertex_groups["Arm.L"].lock_weight = locked
+    if locked:
+        assert bpy.ops.skinwright.transfer_weights() == {"FINISHED"}
+    else:
+        refused("The mask of Coat is its group Arm.L, which would be overwritten", coat)

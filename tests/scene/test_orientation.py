@@ -3,6 +3,8 @@
 import figure
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse import csgraph
 
 
 @pytest.fixture
@@ -57,3 +59,16 @@ def test_what_has_no_inside_stays(outward):
         both = np.concatenate([triangles, triangles[:, ::-1]])  # a card that is seen from both sides
         np.testing.assert_array_equal(outward(patch, both), both)
     assert outward(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)).size == 0
+
+
+@pytest.mark.parametrize("n_faces", [0, 300, 3000])
+def test_what_faces_connect_is_what_scipy_says(addon, n_faces):
+    rng = np.random.default_rng(n_faces)
+    triangles = rng.integers(0, 2000, (n_faces, 3)).astype(np.uint32)
+    place = rng.permutation(2000) // 2  # two vertices at each place
+    found = addon.scene.places.connected(place, triangles)
+    ends = place[np.concatenate([triangles[:, :2], triangles[:, 1:]])].reshape(-1, 2).T
+    graph = sparse.coo_array((np.ones(ends.shape[1]), ends), shape=(1000, 1000))
+    expected = csgraph.connected_components(graph, directed=False)[1][place]
+    assert len(set(zip(found.tolist(), expected.tolist(), strict=True))) == len(set(found.tolist()))
+    assert len(set(found.tolist())) == len(set(expected.tolist()))

@@ -49,16 +49,25 @@ def _write(target: Target, answer: Answer, params: AutoskinParams) -> SkinnedMes
     written = [name for name, computed in zip(names, target.computed, strict=True) if computed]
     rows = csr.take_columns(csr.take_rows(answer.rows, target.vertices), target.computed)
     vertex_groups.write(obj, written, rows, target.vertices)
-    if armature.find(obj) is None:
+    was_free = armature.find(obj) is None
+    if was_free:
         attaching.bind(obj, rig, make_parent=params.make_parent)
     columns = int(np.count_nonzero(target.chosen))
-    return SkinnedMesh(obj.name, rig.name, len(target.vertices), columns, answer.outside, _notes(target))
+    return SkinnedMesh(
+        obj.name, rig.name, len(target.vertices), columns, answer.outside, _notes(target, was_free=was_free)
+    )
 
 
-def _notes(target: Target) -> list[str]:
-    """What keeps the new weights from moving the mesh as they say, and whom they move too."""
+def _notes(target: Target, *, was_free: bool) -> list[str]:
+    """What keeps the new weights from moving the mesh as they say, and whom they move too; `was_free` if nothing
+    deformed it before."""
     obj, rig = target.object, target.rig
     found = [editable.changes_others(obj), target.mirror_warning]
+    if was_free and armature.is_posed(rig):
+        found.append(
+            f"{rig.name} is posed, and its bones at rest were used: if {obj.name} was made for the pose, apply that as "
+            "rest pose and try again"
+        )
     found += [
         f"{obj.name} {phrase}: end that if the weights alone are to move it"
         for phrase in followers.phrases(obj, rig, target.bones.names)

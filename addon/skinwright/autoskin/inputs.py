@@ -99,7 +99,7 @@ def _read_target(obj: bpy.types.Object, rig: bpy.types.Object, bones: RestBones,
             f"all groups of {obj.name} for the bones of {rig.name} are locked: unlock those to be computed"
         )
     chosen = _chosen(obj, rig, bones, computed, params)
-    share = _share(obj, params)
+    share = _share(obj, params, {name for name, taken in zip(bones.names, computed, strict=True) if taken})
     shape = _shape(obj, params)
     partial = not chosen.all() or params.mix_factor < 1 or bool(params.mask_group)
     target = Target(
@@ -139,13 +139,18 @@ def _chosen(
     return chosen
 
 
-def _share(obj: bpy.types.Object, params: AutoskinParams) -> NDArray[np.float64] | float:
+def _share(obj: bpy.types.Object, params: AutoskinParams, written: set[str]) -> NDArray[np.float64] | float:
     """How much of the new rows each vertex takes; one that is not in the mask's group takes nothing."""
     if not params.mask_group:
         return params.mix_factor
     if params.mask_group not in obj.vertex_groups:
         raise SceneError(
             f"{obj.name} has no vertex group {params.mask_group} to use as mask: pick another or clear the field"
+        )
+    if params.mask_group in written:
+        raise SceneError(
+            f"The mask of {obj.name} is its group {params.mask_group}, which would be overwritten with weights: "
+            "pick another group as mask, or rename it"
         )
     rows = vertex_groups.read(obj, [params.mask_group])
     share = np.zeros(len(rows.indptr) - 1)

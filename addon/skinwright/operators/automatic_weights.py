@@ -7,8 +7,9 @@ from ..autoskin import steps
 from ..registration import registration
 from ..reporting import AutoskinReport
 from ..scene import mesh
+from ..scene.error import SceneError
 from ..settings.autoskin import AutoskinSettings
-from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
+from .base import SkinwrightOperator, passed_over, refusal_in_mode, selected_meshes
 from .modal.long_work import LongWork
 
 # Below this the work takes less than the blink of a progress bar.
@@ -43,7 +44,7 @@ class SKINWRIGHT_OT_automatic_weights(LongWork, AutoskinSettings, SkinwrightOper
 
     def complete(self, context: Context, report: AutoskinReport) -> set[str]:
         """Say what was done, and what is worth a look."""
-        return self.tell(report.sentence(), report.all_warnings())
+        return self.tell(report.sentence(), [*report.all_warnings(), *passed_over(context)])
 
     def _steps(self, context: Context) -> jobs.Jobs[AutoskinReport]:
         params = self.to_params(preferences.threads(context))
@@ -55,7 +56,11 @@ def _armature(context: Context) -> Object | None:
     active = context.active_object
     if active and active.type == "ARMATURE":
         return active
-    return next((obj for obj in context.selected_objects if obj.type == "ARMATURE"), None)
+    rigs = [obj for obj in context.selected_objects if obj.type == "ARMATURE"]
+    if len(rigs) > 1:
+        names = " and ".join(rig.name for rig in rigs)
+        raise SceneError(f"{names} are selected: make the armature whose bones count the active object")
+    return rigs[0] if rigs else None
 
 
 register, unregister = registration(SKINWRIGHT_OT_automatic_weights)

@@ -11,6 +11,9 @@ from .modal import brush_session
 
 # The modes of operators that work on meshes as they are selected.
 MESH_MODES = {"OBJECT", "EDIT_MESH", "PAINT_WEIGHT"}
+# What can be converted to a mesh.
+_SURFACES = {"CURVE", "SURFACE", "META", "FONT", "CURVES"}
+_NAMED = 5
 
 
 class SkinwrightOperator(Operator):
@@ -68,6 +71,19 @@ def selected_meshes(context: Context, *, without: Object | None = None) -> list[
     if context.mode != "OBJECT" and active and active.type == "MESH" and active not in meshes:
         meshes.append(active)
     return [obj for obj in meshes if obj != without]
+
+
+def passed_over(context: Context) -> list[str]:
+    """A sentence about selected objects that show a surface but are no meshes, as belts made of a curve."""
+    if context.mode != "OBJECT":
+        return []
+    objects = context.selected_objects
+    others = [obj.name for obj in objects if obj.type in _SURFACES or obj.instance_type == "COLLECTION"]
+    if not others:
+        return []
+    named = ", ".join(others[:_NAMED]) + (", ..." if len(others) > _NAMED else "")
+    are = "is no mesh and was" if len(others) == 1 else "are no meshes and were"
+    return [f"{named} {are} passed over: convert it to a mesh, or make an instance real"]
 
 
 def refusal_in_mode(context: Context, purpose: str) -> str:

@@ -8,7 +8,7 @@ from ..registration import registration
 from ..scene import armature
 from ..settings.embed import EmbedSettings
 from ..settings.properties import last_used
-from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
+from .base import SkinwrightOperator, passed_over, refusal_in_mode, selected_meshes
 from .modal.long_work import LongWork
 
 # Below this the work takes less than the blink of a progress bar.
@@ -52,7 +52,7 @@ class SKINWRIGHT_OT_embed_armature(LongWork, EmbedSettings, SkinwrightOperator):
     def complete(self, context: Context, report: EmbedReport) -> set[str]:
         """Say what was done, and leave what it was done with to the panel."""
         last_used(self.properties, context.scene.skinwright.embed, EmbedSettings.__annotations__)
-        return self.tell(report.sentence(), report.all_warnings())
+        return self.tell(report.sentence(), [*report.all_warnings(), *passed_over(context)])
 
     def _steps(self, context: Context) -> jobs.Jobs[EmbedReport]:
         params = self.to_params(preferences.threads(context))

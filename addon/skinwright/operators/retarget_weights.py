@@ -8,7 +8,7 @@ from ..retarget import RetargetReport, steps
 from ..scene import armature, attributes, mesh
 from ..settings.properties import last_used
 from ..settings.retarget import RetargetSettings
-from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
+from .base import SkinwrightOperator, passed_over, refusal_in_mode, selected_meshes
 from .modal.long_work import LongWork
 
 # Below this a retargeting takes less than the blink of a progress bar.
@@ -55,7 +55,7 @@ class SKINWRIGHT_OT_retarget_weights(LongWork, RetargetSettings, SkinwrightOpera
         if self.show_correspondence:
             attributes.show_colors(context.area)
         last_used(self.properties, context.scene.skinwright.retarget, RetargetSettings.__annotations__)
-        return self.tell(report.sentence(), report.all_warnings())
+        return self.tell(report.sentence(), [*report.all_warnings(), *passed_over(context)])
 
     def _steps(self, context: Context) -> jobs.Jobs[RetargetReport]:
         settings, chosen = context.scene.skinwright.retarget, targets(context)

@@ -10,7 +10,7 @@ from ..settings import TransferSettings
 from ..settings.properties import last_used
 from ..transfer import TransferParams, steps
 from ..transfer.params import means_thresholds
-from .base import SkinwrightOperator, refusal_in_mode, selected_meshes
+from .base import SkinwrightOperator, passed_over, refusal_in_mode, selected_meshes
 from .comparison import compared
 from .modal.long_work import LongWork
 
@@ -79,7 +79,7 @@ class SKINWRIGHT_OT_transfer_weights(LongWork, TransferSettings, SkinwrightOpera
     def complete(self, context: Context, report: Report) -> set[str]:
         """Say what was done, and leave what it was done with to the panel, the preview, the mask and the check."""
         last_used(self.properties, context.scene.skinwright.transfer, TransferSettings.__annotations__)
-        return self.tell(report.sentence(), report.all_warnings())
+        return self.tell(report.sentence(), [*report.all_warnings(), *passed_over(context)])
 
     def _steps(self, context: Context) -> jobs.Jobs[Report]:
         inputs = self._inputs(context)

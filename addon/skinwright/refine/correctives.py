@@ -32,15 +32,16 @@ RECORD = "skinwright_refine"
 @dataclass
 class Certificate:
     """What a key does in the pose it was made for, against the Armature modifier alone. Angles in degrees, volumes in
-    shares of rest (-0.02: 2 % lost), bulge as a multiple of rest, error as a share of the bone's length."""
+    shares of rest (-0.02: 2 % lost), None for shoulders and the like, bulge as a multiple of rest, error as a share of
+    the bone's length."""
 
     joint: str
     direction: str
     angle: float
     pairs_before: int
     pairs_after: int
-    volume_before: float
-    volume_after: float
+    volume_before: float | None
+    volume_after: float | None
     bulge_before: float
     bulge_after: float
     error: float
@@ -175,7 +176,7 @@ def _certify(
     )
 
 
-def _of_joint(figures: dict[str, Any], bone: int) -> dict[str, float]:
+def _of_joint(figures: dict[str, Any], bone: int) -> dict[str, Any]:
     return next((j for j in figures["joints"] if j["bone"] == bone), {"volume": 0.0, "bulge": 1.0})
 
 

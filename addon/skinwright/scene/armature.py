@@ -58,7 +58,7 @@ def rigs(obj: bpy.types.Object) -> list[bpy.types.Object]:
 
 def deformed_meshes(armatures: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     """The visible meshes that one of these armatures deforms."""
-    objects = bpy.context.view_layer.objects
+    objects = list(bpy.context.view_layer.objects)  # asking for visibility may renew the list
     return [o for o in objects if o.type == "MESH" and o.visible_get() and set(rigs(o)) & set(armatures)]
 
 

@@ -22,6 +22,8 @@ def bring_up_to_date(objects: Iterable[bpy.types.Object]) -> None:
         for obj in stale:
             stack.enter_context(_shown(obj))
         layer.update()
+    # Blender frees the layer's list of objects when next it needs it, which may be while somebody goes through it.
+    layer.update()
 
 
 @contextmanager

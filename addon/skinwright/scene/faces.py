@@ -72,14 +72,15 @@ def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32] | None:
     return _attribute(mesh, ".corner_vert", len(mesh.loops))
 
 
-def around(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def around(mesh: bpy.types.Mesh) -> list[NDArray[np.int64]]:
     """(F,) where the corners of each face start, and two sums over its vertices that tell faces of others apart."""
     start = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("loop_start", start)
     vertices = stored(mesh, ".corner_vert", mesh.loops, "vertex_index").astype(np.int64)
     if not start.size:
-        return start, vertices, vertices
-    return start, np.add.reduceat(vertices, start), np.add.reduceat(vertices**2, start)
+        return [vertices]
+    sums: list[NDArray[np.int64]] = [np.add.reduceat(each, start) for each in (vertices, vertices**2)]
+    return [start.astype(np.int64), *sums]
 
 
 def stored(

@@ -34,14 +34,14 @@ def connected(place: NDArray[np.int64], triangles: NDArray[np.uint32]) -> NDArra
     """(V,) the same number for vertices that triangles (T, 3) connect; `place` (V,) is equal for those at one place."""
     corners = place[triangles.astype(np.int64)]
     label = np.arange(int(place.max(initial=-1)) + 1, dtype=np.int64)
-    while corners.size:
-        lowest = label[corners].min(axis=1)
-        before = label.copy()
-        for corner in corners.T:
-            np.minimum.at(label, corner, lowest)
-        label = label[label]
-        if np.array_equal(label, before):
-            break
+    one, other = corners[:, :2].ravel(), corners[:, 1:].ravel()
+    while one.size:
+        one, other = label[one], label[other]
+        apart = one != other
+        one, other = one[apart], other[apart]
+        label[np.maximum(one, other)] = np.minimum(one, other)  # of several any will do: the rest follow
+        while not np.array_equal(label, following := label[label]):
+            label = following
     return label[place]
 
 

@@ -105,7 +105,7 @@ def _check_before(obj: bpy.types.Object) -> None:
         if other.type not in _CHANGES_WEIGHTS:
             raise SceneError(
                 f"The modifier {other.name} of {obj.name} changes the shape before the armature moves it: "
-                "apply it, hide it or move it below the Armature modifier"
+                "apply it, or hide it while you sculpt"
             )
         if other.type != "DATA_TRANSFER" or _transfers_groups(other):
             raise SceneError(

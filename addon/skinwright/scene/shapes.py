@@ -61,7 +61,8 @@ def _evaluated_source(
     with _without(off), _evaluated_mesh(shown) as (evaluated, seen):
         rows = vertex_groups.read_evaluated(evaluated, seen, names)
         if len(obj.data.polygons) and not len(seen.polygons):
-            nothing = mesh.Geometry(np.empty((0, 3), np.float32), *(np.empty((0, n), np.uint32) for n in (3, 2)))
+            triangles, wires = np.empty((0, 3), np.uint32), np.empty((0, 2), np.uint32)
+            nothing = mesh.Geometry(np.empty((0, 3), np.float32), triangles, wires)
             return Shape(nothing, np.array(shown.matrix_world), []), rows
         geometry = mesh.placed(obj, shown.matrix_world, mesh.positions(seen), seen)
         return Shape(geometry, np.array(shown.matrix_world), [modifier.name for modifier in off]), rows
@@ -149,8 +150,8 @@ def weights_after(obj: bpy.types.Object, modifier: bpy.types.Modifier, names: li
         return vertex_groups.read_evaluated(evaluated, seen, names)
 
 
-def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
-    """Whether this modifier moves the mesh's own vertices, by more than rounding; Geometry Nodes may make others."""
+def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier, least: float) -> bool:
+    """Whether this modifier moves the mesh's own vertices, by more than `least` of its size; nodes may make others."""
     place = list(obj.modifiers).index(modifier)
     with looked_at([obj], "AS_SHOWN"), _evaluable(obj) as shown:
         others = [m for m in list(shown.modifiers)[:place] if not modifiers.keeps_vertices(m)]
@@ -158,7 +159,7 @@ def is_moved_by(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
         before, after = _positions_without(shown, [*others, shown.modifiers[place]]), _positions_without(shown, others)
     if before.shape != after.shape or not before.size:
         return False
-    return float(np.abs(after - before).max()) > 1e-5 * float(np.ptp(before, axis=0).max())
+    return float(np.abs(after - before).max()) > least * float(np.ptp(before, axis=0).max())
 
 
 def _plain(obj: bpy.types.Object) -> Shape:
@@ -209,7 +210,8 @@ def _keeps_its_faces(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> bo
         seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         if len(seen.vertices) != len(obj.data.vertices):
             return False
-        return all(map(np.array_equal, faces.around(seen), faces.around(obj.data)))
+        there, here = faces.around(seen), faces.around(obj.data)
+        return len(there) == len(here) and all(np.array_equal(a, b) for a, b in zip(there, here, strict=True))
 
 
 def _positions_without(obj: bpy.types.Object, off: list[bpy.types.Modifier]) -> NDArray[np.float32]:

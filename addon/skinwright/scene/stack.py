@@ -25,6 +25,22 @@ _FIXED_IN_SPACE = {
     "VOLUME_DISPLACE",
     "WARP",
 }
+# Nodes that only compute values, or set what is no place, by the beginning of their names.
+_KEEP_PLACES = (
+    "FunctionNode",
+    "GeometryNodeGroup",
+    "GeometryNodeInput",
+    "GeometryNodeSetMaterial",
+    "GeometryNodeSetShadeSmooth",
+    "GeometryNodeStoreNamedAttribute",
+    "NodeFrame",
+    "NodeGroup",
+    "NodeReroute",
+    "ShaderNode",
+)
+# Moves are rounding below this part of the mesh's size, and what shapes a pose by less is not worth a word.
+_LEAST = 1e-5
+_MUCH = 5e-3
 # They react to the pose, so it comes first.
 _REACTS = {"CLOTH", "CORRECTIVE_SMOOTH", "SOFT_BODY"}
 
@@ -36,7 +52,7 @@ def place_of_armature(obj: bpy.types.Object, sources: Sequence[bpy.types.Object]
     reacts = False
     for index, modifier in enumerate(obj.modifiers):
         reacts = reacts or modifier.type in _REACTS
-        if modifier.type == "MIRROR" or (not reacts and _shapes_at_rest(obj, modifier, sources)):
+        if modifier.type == "MIRROR" or (not reacts and _shapes_at_rest(obj, modifier, sources, _LEAST)):
             place = index + 1
     return place
 
@@ -46,7 +62,7 @@ def shaping_the_pose(obj: bpy.types.Object, sources: Sequence[bpy.types.Object])
     posed = armature.deforms_as_parent(obj) and obj.parent.type == "ARMATURE"
     found = []
     for modifier in obj.modifiers:
-        if posed and modifier.type != "ARRAY" and _shapes_at_rest(obj, modifier, sources):
+        if posed and modifier.type != "ARRAY" and _shapes_at_rest(obj, modifier, sources, _MUCH):
             found.append(modifier)
         posed = posed or (modifier.type == "ARMATURE" and bool(modifier.object) and modifier.show_viewport)
     return found
@@ -72,12 +88,14 @@ def _moves(other: bpy.types.Object, modifier: bpy.types.Modifier, sources: Seque
     return modifier.type in _FOLLOWS_A_SHAPE and carried.is_deformed(other, sources)
 
 
-def _shapes_at_rest(obj: bpy.types.Object, modifier: bpy.types.Modifier, sources: Sequence[bpy.types.Object]) -> bool:
+def _shapes_at_rest(
+    obj: bpy.types.Object, modifier: bpy.types.Modifier, sources: Sequence[bpy.types.Object], least: float
+) -> bool:
     """Whether it fits the mesh by places that no pose moves, and so is part of its rest shape."""
     if not modifier.show_viewport or not _is_fixed(modifier) or follows_pose(modifier, sources):
         return False
     if modifiers.keeps_vertices(modifier) or modifier.type == "NODES":
-        return shapes.is_moved_by(obj, modifier)
+        return shapes.is_moved_by(obj, modifier, least)
     return True
 
 
@@ -86,4 +104,15 @@ def _is_fixed(modifier: bpy.types.Modifier) -> bool:
     if modifier.type == "DISPLACE":
         by_place = modifier.texture is not None and modifier.texture_coords != "UV"
         return by_place or modifier.direction not in ("NORMAL", "CUSTOM_NORMAL")
-    return modifier.type in _FIXED_IN_SPACE or modifier.type == "NODES"
+    if modifier.type == "NODES":
+        return modifier.node_group is not None and not all(map(_keeps_places, _nodes(modifier.node_group)))
+    return modifier.type in _FIXED_IN_SPACE
+
+
+def _nodes(tree: bpy.types.NodeTree) -> list[bpy.types.Node]:
+    return [node for each in modifier_inputs.trees(tree) for node in each.nodes]
+
+
+def _keeps_places(node: bpy.types.Node) -> bool:
+    """Whether it surely moves no vertex, as those that Shade Auto Smooth adds; all others are tried."""
+    return node.bl_idname.startswith(_KEEP_PLACES)

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import csr
-from ..scene import armature, mesh, places, vertex_groups
+from ..scene import armature, places, shapes, vertex_groups
 from ..scene.error import SceneError
 from . import near_borders
 from .compute import Result
@@ -80,7 +80,8 @@ def _on_other_parts(body: Body, garment: Garment, result: Result) -> str:
     shares: dict[str, float] = {}
     for other in others:
         try:
-            surface = _some(mesh.read(other).positions, _MOST_OF_BODY)
+            with shapes.looked_at([other], "AS_SHOWN"):
+                surface = _some(shapes.read_target(other, "AS_SHOWN").geometry.positions, _MOST_OF_BODY)
         except SceneError:  # it has no surface that could be meant
             continue
         near = places.nearest(surface, points[points_far]) < 0.5 * reach

@@ -125,7 +125,7 @@ def _body_objects(
     """The picked mesh and those it stands for."""
     others = {
         "OBJECT": lambda: [],
-        "PARTS": lambda: _continuing(source, targets),
+        "PARTS": lambda: _continuing(source, targets, params.geometry),
         "ARMATURE": lambda: armature.deformed_meshes(armature.rigs(source)),
         "COLLECTION": lambda: mesh.in_collections_of(source),
     }[params.source_scope]()
@@ -133,14 +133,15 @@ def _body_objects(
     return [obj for obj in found if obj == source or (obj.vertex_groups and obj.data.polygons)]
 
 
-def _continuing(source: bpy.types.Object, targets: list[bpy.types.Object]) -> list[bpy.types.Object]:
+def _continuing(source: bpy.types.Object, targets: list[bpy.types.Object], look: shapes.Look) -> list[bpy.types.Object]:
     """The visible meshes on the source's armature whose borders lie on its own, as the head of a body in parts."""
     rigs = armature.rigs(source)
     others = [o for o in armature.deformed_meshes(rigs) if o != source and o not in targets and o.data.polygons]
     if not others or not source.data.polygons:
         return []
     try:
-        geometries = [mesh.read(obj) for obj in (source, *others)]
+        with shapes.looked_at([source, *others], look):
+            geometries = [shapes.read_target(obj, look).geometry for obj in (source, *others)]
     except SceneError:  # one of them cannot be read: the source itself is read next, and says so
         return []
     together = next(group for group in parts.groups(geometries) if 0 in group)

@@ -159,11 +159,15 @@ def _unseen(garment: Garment) -> str:
 
 
 def _pose(body: Body, garment: Garment, params: TransferParams) -> str:
-    follows = armature.follows_any(garment.object, body.rigs)
-    if params.geometry == "CURRENT" or follows or body.armature is None or not armature.is_posed(body.armature):
+    """The pose of an armature that carries the body's own counts too, unless it carries the target as well."""
+    if params.geometry == "CURRENT" or armature.follows_any(garment.object, body.rigs):
+        return ""
+    along = set(armature.moving([garment.object])) - set(body.rigs)
+    posed = [rig for rig in armature.moving(body.objects) if rig not in along and armature.is_posed(rig)]
+    if not posed:
         return ""
     return (
-        f"{body.armature.name} is posed, and shapes in rest pose were compared: "
+        f"{posed[0].name} is posed, and shapes in rest pose were compared: "
         f"set Geometry to Current if {garment.object.name} was fitted on the posed body, to bind it in this pose"
     )
 

@@ -57,6 +57,7 @@ def read_garment(target: bpy.types.Object, body: Body, params: TransferParams) -
     """A target's shape, mask and locks; its old weights only where they take part in the new ones."""
     start = time.perf_counter()
     evaluation.bring_up_to_date([target])
+    _check_mask(target, body, params)
     locks = vertex_groups.locked(target)
     own_bones = _bone_names(target, body, params) & {group.name for group in target.vertex_groups}
     names = body.bones + sorted(own_bones - set(body.bones))
@@ -141,6 +142,15 @@ def read_mask(target: bpy.types.Object, settings: Mask | None = None) -> NDArray
         return None
     reading = mask.Reading[settings.reading]
     return mask.read(target, settings.group, reading, threshold=settings.threshold, invert=settings.invert)
+
+
+def _check_mask(target: bpy.types.Object, body: Body, params: TransferParams) -> None:
+    settings = params.mask or target.skinwright.mask()
+    if settings is not None and settings.group in body.chosen - vertex_groups.locked(target):
+        raise SceneError(
+            f"The mask of {target.name} is its group {settings.group}, which would be overwritten with the weights of "
+            f"{body.object.name}: pick another group as mask, or rename it"
+        )
 
 
 def _check_locks(garment: Garment) -> None:

@@ -44,10 +44,11 @@ def _draw_certificates(layout: UILayout, certificates: list[dict]) -> None:
             worst[one["joint"]] = one
     column = layout.column(align=True)
     for joint, one in list(worst.items())[:_SHOWN]:
-        pairs = f"pairs {one['pairs_before']} to {one['pairs_after']}"
-        volume = f"volume {one['volume_before']:+.1%} to {one['volume_after']:+.1%}"
+        figures = f"pairs {one['pairs_before']} to {one['pairs_after']}"
+        if one["volume_before"] is not None:
+            figures += f", volume {one['volume_before']:+.1%} to {one['volume_after']:+.1%}"
         icon = "CHECKMARK" if one["pairs_after"] == 0 else "ERROR"
-        column.label(text=f"{joint} {one['direction']} {one['angle']:.0f}°: {pairs}, {volume}", icon=icon)
+        column.label(text=f"{joint} {one['direction']} {one['angle']:.0f}°: {figures}", icon=icon)
     if len(worst) > _SHOWN:
         column.label(text=f"and {len(worst) - _SHOWN} more joints")
 

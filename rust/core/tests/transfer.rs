@@ -84,7 +84,8 @@ fn every_degenerate_mesh_gets_proper_rows_under_every_policy() {
                     assert!(values.iter().all(|&x| x > 0.0 && x <= 1.0), "{}: row {i} is {values:?}", target.name);
                     assert!(bones.is_sorted(), "{}: row {i}", target.name);
                 }
-                assert!(result.report.largest_residual < 1e-12, "{}: {:?}", target.name, result.report);
+                let most = if method == MatchMethod::Confidence { 1e-5 } else { 1e-12 };
+                assert!(result.report.largest_residual < most, "{}: {:?}", target.name, result.report);
             }
         }
     }

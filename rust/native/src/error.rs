@@ -1,10 +1,8 @@
 //! The one table from the core's errors to Python exceptions, and the one door that frees the GIL.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, OnceLock};
+use std::sync::OnceLock;
 use std::thread::Builder;
-use std::time::Duration;
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};

@@ -7,20 +7,29 @@ use crate::substitute::solution::{RightHandSides, Solution};
 
 /// The error that [`Solution::residual`] tells of.
 pub(crate) fn backward_error(matrix: &SymmetricMatrix, solution: &Solution, rhs: &RightHandSides) -> f64 {
-    let factors: Vec<f64> =
-        (0..rhs.columns as u32).map(|k| if (k * 0x9E37 + 0x79B9) & 0x40 == 0 { 1.0 } else { -0.6 }).collect();
+    let factors: Vec<f64> = (0..rhs.columns).map(share).collect();
     let combined = |i: usize| -> (f64, f64) {
         let b = rhs.row(i).map_or(0.0, |row| row.iter().zip(&factors).map(|(b, factor)| b * factor).sum());
         (solution.combined(i, &factors), b)
     };
     let (x, b): (Vec<f64>, Vec<f64>) = (0..matrix.size()).into_par_iter().with_min_len(256).map(combined).unzip();
-    let mut r = b.clone();
+    relative_defect(matrix, &x, &b)
+}
+
+/// What a column counts for in the combination that is measured.
+pub(crate) fn share(column: usize) -> f64 {
+    if (column as u32).wrapping_mul(0x9E37).wrapping_add(0x79B9) & 0x40 == 0 { 1.0 } else { -0.6 }
+}
+
+/// `|b - A x| / (|A| |x| + |b|)`, maximum norms.
+pub(crate) fn relative_defect(matrix: &SymmetricMatrix, x: &[f64], b: &[f64]) -> f64 {
+    let mut r = b.to_vec();
     let mut row_sums = vec![0.0; r.len()];
     for_each_entry(matrix, |i, j, value| {
         r[i] -= value * x[j];
         row_sums[i] += value.abs();
     });
-    let scale = norm(&row_sums) * norm(&x) + norm(&b);
+    let scale = norm(&row_sums) * norm(x) + norm(b);
     if scale == 0.0 { norm(&r) } else { norm(&r) / scale }
 }
 

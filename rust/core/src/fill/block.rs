@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
-use skinwright_solve::{Cholesky, Failure, RightHandSides, Solution, SparseRows, SymmetricMatrix};
+use skinwright_solve::{Cholesky, Failure, Precision, RightHandSides, Solution, SparseRows, SymmetricMatrix};
 
 use super::constraint::Known;
 use super::rows::{KnownRows, Row};
@@ -16,12 +16,20 @@ use crate::progress::Progress;
 /// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;
 
+/// Which energy a block minimises, and how its factor is stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Form {
+    /// l.
+    pub length: f64,
+    pub precision: Precision,
+}
+
 /// The assembled system of a block of unknowns.
 #[derive(Debug)]
 pub struct System {
     unknowns: Vec<u32>,
     soft: Vec<(u32, f64)>,
-    length: f64,
+    form: Form,
     matrix: SymmetricMatrix,
     boundary: Boundary,
 }
@@ -32,19 +40,19 @@ impl System {
         &self.unknowns
     }
 
-    /// Takes the block for that of another `length`, because its own cannot be solved.
-    pub(super) fn standing_for(self, length: f64) -> Self {
-        Self { length, ..self }
+    /// Takes the block for that of another `form`, because its own cannot be solved.
+    pub(super) fn standing_for(self, form: Form) -> Self {
+        Self { form, ..self }
     }
 
     /// Assembles the block of `unknowns`; `number` is from [`system::number_unknowns`].
-    pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], length: f64) -> Self {
-        let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, length);
+    pub(super) fn new(laplacian: &Laplacian, known: &Known, unknowns: Vec<u32>, number: &[u32], form: Form) -> Self {
+        let (mut matrix, boundary) = system::assemble(laplacian, &unknowns, number, form.length);
         let soft: Vec<_> = soft_unknowns(known, &unknowns).collect();
         for &(k, confidence) in &soft {
             matrix.values[matrix.column_starts[k as usize]] += confidence;
         }
-        Self { unknowns, soft, length, matrix, boundary }
+        Self { unknowns, soft, form, matrix, boundary }
     }
 }
 
@@ -61,7 +69,7 @@ pub struct Block {
     unknowns: Vec<u32>,
     /// Places of the soft unknowns and their confidences.
     pub(super) soft: Vec<(u32, f64)>,
-    length: f64,
+    form: Form,
     pub(super) boundary: Boundary,
     pub(super) factor: Cholesky,
     /// Backward error of a solve whose answer is 1 everywhere, once somebody asked.
@@ -81,7 +89,7 @@ enum Values<'b> {
     /// no energy.
     Constant(f64),
     Solved(Solution<'b>),
-    /// Some columns each, and the backward error of the factor.
+    /// Some columns each, and the backward error of the first solve.
     Sparse(Vec<SparseColumns<'b>>, f64),
 }
 
@@ -119,14 +127,17 @@ impl<'b> SparseColumns<'b> {
         self.solves.rows.minimum(self.least)
     }
 
-    fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let noticeable = self.solves.rows.row(k).filter(|(_, value)| value.abs() >= self.least);
-        noticeable.map(|(slot, value)| (self.columns[slot as usize], value))
+    fn append_row(&self, k: usize, out: &mut Row) {
+        self.solves.rows.for_each_in_row(k, |slot, value| {
+            if value.abs() >= self.least {
+                out.push((self.columns[slot], value));
+            }
+        });
     }
 }
 
 impl<'b> BlockRows<'b> {
-    /// These columns, by column; `residual` is the factor's backward error.
+    /// These columns, by column; `residual` is the largest backward error.
     pub(super) fn sparse(rows: Vec<SparseColumns<'b>>, residual: f64) -> Self {
         Self { columns: Vec::new(), values: Values::Sparse(rows, residual) }
     }
@@ -136,16 +147,13 @@ impl<'b> BlockRows<'b> {
         Self { columns: vec![column], values: Values::Constant(value) }
     }
 
-    /// Columns and values of the block's unknown `k`, by column.
-    pub fn row(&self, k: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let (constant, solution, sparse) = match &self.values {
-            Values::Constant(value) => (Some(*value), None, [].as_slice()),
-            Values::Solved(solution) => (None, Some(solution), [].as_slice()),
-            Values::Sparse(rows, _) => (None, None, &rows[..]),
-        };
-        let values = constant.into_iter().chain(solution.into_iter().flat_map(move |solution| solution.row(k)));
-        std::iter::zip(self.columns.iter().copied(), values)
-            .chain(sparse.iter().flat_map(move |columns| columns.row(k)))
+    /// Appends columns and values of the block's unknown `k` to `out`, by column.
+    pub fn append_row(&self, k: usize, out: &mut Row) {
+        match &self.values {
+            Values::Constant(value) => out.push((self.columns[0], *value)),
+            Values::Solved(solution) => out.extend(std::iter::zip(self.columns.iter().copied(), solution.row(k))),
+            Values::Sparse(rows, _) => rows.iter().for_each(|columns| columns.append_row(k, out)),
+        }
     }
 
     /// Columns and values that solve number `solve` of a screened block has found for unknown `k`, if they were all kept.
@@ -160,10 +168,12 @@ impl<'b> BlockRows<'b> {
 
     /// The smallest value of the block's `count` unknowns.
     pub fn minimum(&self, count: usize) -> f64 {
-        if let Values::Sparse(rows, _) = &self.values {
-            return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min);
-        }
-        let least = |k| self.row(k).map(|(_, value)| value).fold(f64::INFINITY, f64::min);
+        let solution = match &self.values {
+            Values::Constant(value) => return *value,
+            Values::Sparse(rows, _) => return rows.iter().map(SparseColumns::minimum).fold(f64::INFINITY, f64::min),
+            Values::Solved(solution) => solution,
+        };
+        let least = |k| solution.row(k).fold(f64::INFINITY, f64::min);
         (0..count).into_par_iter().with_min_len(256).map(least).reduce(|| f64::INFINITY, f64::min)
     }
 
@@ -183,13 +193,14 @@ impl Block {
     /// # Errors
     /// [`Error::NotPositiveDefinite`] with a vertex of the block, [`Error::Cancelled`].
     pub fn new(positions: &[[f32; 3]], system: System, progress: &Progress) -> Result<Self> {
-        let System { unknowns, soft, length, matrix, boundary } = system;
+        let System { unknowns, soft, form, matrix, boundary } = system;
         let positions: Vec<_> = unknowns.iter().map(|&i| positions[i as usize].into()).collect();
-        let factor = Cholesky::factor_until(matrix, &positions, progress.stop()).map_err(|failure| match failure {
+        let factor = Cholesky::factor_in(form.precision, matrix, &positions, progress.stop());
+        let factor = factor.map_err(|failure| match failure {
             Failure::NotPositive(failed) => Error::NotPositiveDefinite { vertex: unknowns[failed.unknown] as usize },
             Failure::Stopped => Error::Cancelled,
         })?;
-        Ok(Self { unknowns, soft, length, boundary, factor, accuracy: OnceLock::new() })
+        Ok(Self { unknowns, soft, form, boundary, factor, accuracy: OnceLock::new() })
     }
 
     /// The block's vertices, ascending.
@@ -197,11 +208,9 @@ impl Block {
         &self.unknowns
     }
 
-    /// Whether this factorisation serves the block of `unknowns` with the confidences of `known` at `length`.
-    pub(super) fn serves(&self, unknowns: &[u32], known: &Known, length: f64) -> bool {
-        self.length == length
-            && self.unknowns == unknowns
-            && soft_unknowns(known, unknowns).eq(self.soft.iter().copied())
+    /// Whether this factorisation serves the block of `unknowns` with the confidences of `known` in this `form`.
+    pub(super) fn serves(&self, unknowns: &[u32], known: &Known, form: Form) -> bool {
+        self.form == form && self.unknowns == unknowns && soft_unknowns(known, unknowns).eq(self.soft.iter().copied())
     }
 
     /// Rows of the unknowns.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::block::{Block, BlockRows, System};
+use super::block::{Block, BlockRows, Form, System};
 use super::constraint::Known;
 use super::rows::KnownRows;
 use super::screened::{self, Given};
@@ -25,20 +25,20 @@ impl Blocks {
         &mut self,
         laplacian: &Laplacian,
         known: &Known,
-        length: f64,
+        form: Form,
         progress: &Progress,
     ) -> Result<Vec<System>> {
-        let wanted = independent_blocks(laplacian, &known.unknown, length);
+        let wanted = independent_blocks(laplacian, &known.unknown, form.length);
         let number = number_unknowns(&wanted, known.unknown.len());
         self.0.retain(|block| {
             let at = wanted.binary_search_by_key(&block.unknowns()[0], |unknowns| unknowns[0]);
-            at.is_ok_and(|at| block.serves(&wanted[at], known, length))
+            at.is_ok_and(|at| block.serves(&wanted[at], known, form))
         });
         let kept = |first| self.0.binary_search_by_key(&first, |block| block.unknowns()[0]).is_ok();
         let missing: Vec<Vec<u32>> = wanted.into_iter().filter(|unknowns| !kept(unknowns[0])).collect();
         let assemble = |unknowns| {
             progress.check()?;
-            Ok(System::new(laplacian, known, unknowns, &number, length))
+            Ok(System::new(laplacian, known, unknowns, &number, form))
         };
         missing.into_par_iter().map(assemble).collect()
     }

@@ -49,7 +49,7 @@ impl<'a> Filled<'a> {
                 Constraint::Soft(b) if b > 0.0 => self.known.append(at as u32, out),
                 Constraint::Soft(_) | Constraint::Free => {}
             },
-            (b, k) => out.extend(self.rows[b as usize].row(k as usize)),
+            (b, k) => self.rows[b as usize].append_row(k as usize, out),
         }
     }
 

@@ -25,13 +25,15 @@ pub use screened::{Found, Patch, RowTable, Screen};
 
 use std::borrow::Cow;
 
+use skinwright_solve::Precision;
+
 use crate::adjacency::{Islands, NONE, Topology};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 use crate::weld::Weld;
-use block::System;
+use block::{Form, System};
 use blocks::Blocks;
 use constraint::Known;
 use rows::KnownRows;
@@ -89,7 +91,7 @@ pub struct Fill {
 #[must_use = "nothing is factored yet"]
 pub struct Assembled {
     known: Known,
-    length: f64,
+    form: Form,
     missing: Vec<System>,
 }
 
@@ -208,6 +210,19 @@ impl Fill {
     /// # Errors
     /// [`Error::LengthMismatch`], [`Error::InvalidParameter`], [`Error::Cancelled`].
     pub fn assemble(&mut self, constraints: Vec<Constraint>, length: f64, progress: &Progress) -> Result<Assembled> {
+        self.assemble_in(Form { length, precision: Precision::Double }, constraints, progress)
+    }
+
+    /// Poses a problem for [`Self::solve_screened`] alone: l = 0, and factors take half the memory.
+    ///
+    /// # Errors
+    /// Those of [`Fill::assemble`].
+    pub fn assemble_screened(&mut self, constraints: Vec<Constraint>, progress: &Progress) -> Result<Assembled> {
+        self.assemble_in(Form { length: 0.0, precision: Precision::Single }, constraints, progress)
+    }
+
+    fn assemble_in(&mut self, form: Form, constraints: Vec<Constraint>, progress: &Progress) -> Result<Assembled> {
+        let length = form.length;
         let (found, expected) = (constraints.len(), self.vertex_count);
         if found != expected {
             return Err(Error::LengthMismatch { what: "constraints", found, expected });
@@ -217,8 +232,8 @@ impl Fill {
             return Err(Error::InvalidParameter { name: "length", value: length, must });
         }
         let known = Known::new(constraints, self.weld.as_ref(), &self.islands)?;
-        let missing = self.blocks.assemble_missing(&self.laplacian, &known, length, progress)?;
-        Ok(Assembled { known, length, missing })
+        let missing = self.blocks.assemble_missing(&self.laplacian, &known, form, progress)?;
+        Ok(Assembled { known, form, missing })
     }
 
     /// Factors the blocks that were missing; they are kept until a problem has no use for them.
@@ -229,9 +244,9 @@ impl Fill {
     /// # Errors
     /// [`Error::NotPositiveDefinite`], [`Error::Cancelled`]; the blocks that were there before stay usable.
     pub fn factor(&mut self, assembled: Assembled, progress: &Progress) -> Result<()> {
-        let Assembled { known, length, missing } = assembled;
+        let Assembled { known, form, missing } = assembled;
         let mut failed = self.blocks.factor(&self.positions, missing, progress)?;
-        for (floor, used_length) in FLOORS.map(|floor| (floor, length)).into_iter().chain([(LAST_FLOOR, 0.0)]) {
+        for (floor, length) in FLOORS.map(|floor| (floor, form.length)).into_iter().chain([(LAST_FLOOR, 0.0)]) {
             if failed.is_empty() {
                 break;
             }
@@ -239,8 +254,8 @@ impl Fill {
             let topology = Topology::with_edges(&self.triangles, &self.edges, self.positions.len());
             let laplacian = Laplacian::with_floor(&mesh, &topology, floor);
             let number = number_unknowns(&failed, self.positions.len());
-            let system =
-                |unknowns| System::new(&laplacian, &known, unknowns, &number, used_length).standing_for(length);
+            let used = Form { length, ..form };
+            let system = |unknowns| System::new(&laplacian, &known, unknowns, &number, used).standing_for(form);
             let systems = failed.into_iter().map(system).collect();
             failed = self.blocks.factor(&self.positions, systems, progress)?;
         }
@@ -276,7 +291,7 @@ impl Fill {
         })
     }
 
-    /// Solves the problem posed last, with l = 0 and confidences from [`screened::confidence`], such that every soft row is
+    /// Solves the problem posed last by [`Self::assemble_screened`], with confidences from [`screened::confidence`], such that every soft row is
     /// trusted over its length. `screen` has the [table](Self::row_table) of the `given` rows, and what else there is to it.
     ///
     /// # Errors

@@ -29,14 +29,15 @@ use crate::progress::Progress;
 
 /// a: how much shorter the two smoothing solves reach than the wanted energy. From 1.25 to 2.5 figures are alike.
 const REACH: f64 = 1.5;
-/// Magnitude that counts as zero between solves.
+/// Magnitude that counts as zero between solves. Single precision errs by less where lengths are some tens of edges.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Backward error of the first solve, with all that was neglected, above which the factor is looked into.
+const DOUBTFUL: f64 = 1e-4;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
-/// Blocks with more unknowns than this are solved for fewer columns at a time, for the sake of memory.
+/// Blocks with more unknowns than this collect some rows twice instead of holding them, for the sake of memory.
 const MANY: usize = 300_000;
-const FEWER_COLUMNS: usize = 16;
 
 /// Columns and values of every vertex of the mesh that is solved on, empty where none are known.
 pub type RowTable = Ragged<(u32, f64)>;
@@ -66,7 +67,7 @@ pub struct Screen<'a> {
     /// The [table](super::Fill::row_table) of the given rows.
     pub rows: &'a RowTable,
     /// Share of the change of these rows along each edge that stays whatever the lengths, in the order of the Laplacian's
-    /// rows, (V).
+    /// rows, (V); where both ends have a list, that of the lower index counts.
     pub kept: &'a Ragged<f64>,
     /// If this is only a part of a problem.
     pub patch: Option<Patch<'a>>,
@@ -89,8 +90,8 @@ pub(super) struct Given<'a> {
 }
 
 /// One block with what all of its columns need. Its vertices are the unknowns first, then those around.
-struct Screened<'a> {
-    block: &'a Block,
+struct Screened<'a, 'b> {
+    block: &'b Block,
     screen: Screen<'a>,
     /// For each unknown: vertices around whose change is kept, and with what weight.
     kept: Ragged<(u32, f64)>,
@@ -110,22 +111,17 @@ pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress)
     if let Some((column, value)) = screened.only_row() {
         return Ok(BlockRows::constant(column, value));
     }
-    let accuracy = block.accuracy()?;
-    let columns = screened.columns();
-    let places = Places::of(&columns).of_column;
-    let solver = block.factor.sparse();
-    let solve = |(first, columns): (usize, &[u32])| {
-        let group = Group { screened: &screened, columns, places: &places, first, solver, progress };
-        group.solve().map(|solves| SparseColumns::new(columns.to_vec(), solves, LEAST))
-    };
-    let together = if block.unknowns().len() > MANY { FEWER_COLUMNS } else { MOST_COLUMNS };
-    let groups = std::iter::zip((0..).step_by(together), columns.chunks(together));
-    let found = groups.map(solve).collect::<Result<_>>()?;
-    Ok(BlockRows::sparse(found, accuracy))
+    let rows = screened.solve(progress)?;
+    if rows.residual() <= DOUBTFUL {
+        return Ok(rows);
+    }
+    // Another factor may have taken its place by then.
+    block.accuracy()?;
+    screened.solve(progress)
 }
 
-impl<'a> Screened<'a> {
-    fn new(block: &'a Block, given: Given<'a>) -> Self {
+impl<'a, 'b> Screened<'a, 'b> {
+    fn new(block: &'b Block, given: Given<'a>) -> Self {
         let unknowns = block.unknowns();
         let mut confidence = vec![0.0; unknowns.len()];
         block.soft.iter().for_each(|&(k, value)| confidence[k as usize] = value);
@@ -134,6 +130,23 @@ impl<'a> Screened<'a> {
         let least_ratio = ratios.fold(f64::INFINITY, f64::min);
         let kept = Ragged::new(unknowns.len(), |k, out| append_kept(block, given, &confidence, k, out));
         Self { block, screen: given.screen, kept, confidence, mass, least_ratio }
+    }
+
+    fn solve(&self, progress: &Progress) -> Result<BlockRows<'b>> {
+        let columns = self.columns();
+        let (count, places) = (columns.len(), Places::of(&columns).of_column);
+        let solver = self.block.factor.sparse();
+        let mut residual = 0.0;
+        let solve = |(first, columns): (usize, &[u32])| {
+            let has_all = std::iter::zip(0.., columns).all(|(k, &column)| k == column) && columns.len() == count;
+            let group = Group { screened: self, columns, places: &places, first, has_all, solver, progress };
+            let (solves, error) = group.solve()?;
+            residual = f64::max(residual, error);
+            Ok(SparseColumns::new(columns.to_vec(), solves, LEAST))
+        };
+        let groups = std::iter::zip((0..).step_by(MOST_COLUMNS), columns.chunks(MOST_COLUMNS));
+        let found = groups.map(solve).collect::<Result<_>>()?;
+        Ok(BlockRows::sparse(found, residual))
     }
 
     fn count(&self) -> usize {
@@ -197,6 +210,13 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
     let (neighbours, cotangents) = given.laplacian.row(i);
     for ((&j, cotangent), share) in std::iter::zip(std::iter::zip(neighbours, cotangents), given.screen.kept.of(i)) {
         let there = given.screen.rows.of(j as usize);
+        let share = match given.screen.kept.of(j as usize) {
+            theirs if (j as usize) < i && !theirs.is_empty() => {
+                let back = given.laplacian.neighbours(j as usize).iter().position(|&back| back as usize == i);
+                back.map_or(0.0, |at| theirs[at])
+            }
+            _ => *share,
+        };
         if cotangent * share == 0.0 || there.is_empty() || there == given.screen.rows.of(i) {
             continue;
         }
@@ -210,19 +230,21 @@ fn append_kept(block: &Block, given: Given<'_>, confidence: &[f64], k: usize, ou
 
 /// A few columns of a block.
 struct Group<'a, 'b> {
-    screened: &'a Screened<'a>,
+    screened: &'a Screened<'a, 'b>,
     columns: &'a [u32],
     /// Place of every column among the block's.
     places: &'a [u32],
     /// The place of the group's first column.
     first: usize,
+    /// Whether these are all columns there are, each in its place.
+    has_all: bool,
     solver: SparseSolver<'b>,
     progress: &'a Progress,
 }
 
 impl<'b> Group<'_, 'b> {
-    /// Values of the unknowns.
-    fn solve(&self) -> Result<Solves<'b>> {
+    /// Values of the unknowns, and the backward error of the first solve.
+    fn solve(&self) -> Result<(Solves<'b>, f64)> {
         let Screened { confidence, mass, least_ratio, .. } = self.screened;
         let solver = self.solver;
         let add = || solver.collect(|k, out| self.add(k, out));
@@ -232,37 +254,42 @@ impl<'b> Group<'_, 'b> {
         let mut solve = |solve: usize, terms: &[Term<'_, 'b>], least: &(dyn Fn(usize) -> f64 + Sync)| {
             self.substitute(solve, terms, least, &mut work)
         };
-        let first = solve(0, &[(&given, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
-        let second = solve(1, &[(&first, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
+        let (first, residual) = solve(0, &[(&given, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
+        let (second, _) = solve(1, &[(&first, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
         let scale = |k: usize| confidence[k] * confidence[k] / mass[k];
         let to_given = |k: usize| scale(k) / (REACH * REACH);
         let to_second = |k: usize| -scale(k) * (1.0 / (REACH * REACH) + 1.0);
         let least = |k: usize| NEGLIGIBLE * (confidence[k] / mass[k]).max(*least_ratio);
         // It is not needed for the correction, and of a large block memory is scarce.
         let added = (self.screened.count() <= MANY).then_some(added);
-        let correction = solve(CORRECTION, &[(&given, &to_given), (&first, &scale), (&second, &to_second)], &least)?;
+        let terms: [Term; 3] = [(&given, &to_given), (&first, &scale), (&second, &to_second)];
+        let (correction, _) = solve(CORRECTION, &terms, &least)?;
         drop(given);
         let first = self.screened.screen.with_all_solves.then_some(first);
         let added = added.unwrap_or_else(add);
         let corrected: [Term; 3] = [(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)];
-        let rows = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
-        Ok(Solves { earlier: first.map(|first| [first, second, correction]), rows })
+        let (rows, _) = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
+        Ok((Solves { earlier: first.map(|first| [first, second, correction]), rows }, residual))
     }
 
-    /// The solution of solve number `solve` for the sum of `terms` and what is held.
+    /// The solution of solve number `solve` for the sum of `terms` and what is held, and of the first one the backward error.
     fn substitute(
         &self,
         solve: usize,
         terms: &[Term<'_, 'b>],
         least: &(dyn Fn(usize) -> f64 + Sync),
         work: &mut Workspace,
-    ) -> Result<SparseRows<'b>> {
-        let stop = self.progress.stop();
+    ) -> Result<(SparseRows<'b>, f64)> {
+        let mut substitute = |terms: &[Term<'_, 'b>]| {
+            let found = self.solver.solve(terms, least, work, self.progress.stop());
+            let residual = if solve == 0 { self.solver.residual(terms, &found) } else { 0.0 };
+            (found, residual)
+        };
         let found = match self.screened.screen.patch {
-            None => self.solver.solve(terms, least, work, stop),
+            None => substitute(terms),
             Some(_) => {
                 let held = self.solver.collect(|k, out| self.add_held(solve, k, out));
-                self.solver.solve(&[terms, &[(&held, &|_: usize| 1.0)]].concat(), least, work, stop)
+                substitute(&[terms, &[(&held, &|_: usize| 1.0)]].concat())
             }
         };
         self.progress.check().map(|()| found)
@@ -286,6 +313,9 @@ impl<'b> Group<'_, 'b> {
     }
 
     fn append_row(&self, row: impl Iterator<Item = (u32, f64)>, factor: f64, out: &mut Vec<(u32, f64)>) {
+        if self.has_all {
+            return out.extend(row.map(|(column, value)| (column, factor * value)));
+        }
         let columns = 0..self.columns.len();
         out.extend(row.filter_map(|(column, value)| {
             let slot = (self.places[column as usize] as usize).wrapping_sub(self.first);

@@ -26,6 +26,8 @@ const TRIPLES: [([usize; 3], f64); 10] = [
 /// The cluster as seen from afar.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
+    /// Twice the sum of the triangles' areas.
+    area: f64,
     /// Centre of the area, p.
     centre: DVec3,
     /// Distance from the centre to the farthest corner.
@@ -41,11 +43,46 @@ pub(super) struct Moments {
 impl Moments {
     /// Of these triangles.
     pub(super) fn new(triangles: &[[DVec3; 3]]) -> Self {
-        let mut moments = Self { centre: centre_of_area(triangles), ..Self::default() };
+        let (area, centre) = area_and_centre(triangles);
+        let mut moments = Self { area, centre, ..Self::default() };
         for triangle in triangles {
             moments.add(triangle.map(|x| x - moments.centre));
         }
+        moments.with_radius(triangles)
+    }
+
+    /// Of both clusters' triangles, still without a radius.
+    pub(super) fn joined(parts: [&Self; 2]) -> Self {
+        let area = parts[0].area + parts[1].area;
+        let share = if area > 0.0 { parts[1].area / area } else { 0.5 };
+        let centre = parts[0].centre.lerp(parts[1].centre, share);
+        let mut moments = Self { area, centre, ..Self::default() };
+        parts.into_iter().for_each(|part| moments.add_cluster(part));
         moments
+    }
+
+    /// With the radius of these triangles, which are those of the cluster.
+    pub(super) fn with_radius(self, triangles: &[[DVec3; 3]]) -> Self {
+        let squared = |x: &DVec3| x.distance_squared(self.centre);
+        Self { radius: triangles.iter().flatten().map(squared).fold(0.0, f64::max).sqrt(), ..self }
+    }
+
+    /// Seen from this centre the cluster's y is y + d.
+    fn add_cluster(&mut self, part: &Self) {
+        let (n, d) = (part.first, part.centre - self.centre);
+        let mut matrix = [[0.0; 3]; 3];
+        for (entry, ([i, j], times)) in part.second.iter().zip(PAIRS) {
+            (matrix[i][j], matrix[j][i]) = (entry / times, entry / times);
+        }
+        self.first += n;
+        for (k, ([i, j], times)) in PAIRS.into_iter().enumerate() {
+            self.second[k] += part.second[k] + times * 0.5 * (n[i] * d[j] + n[j] * d[i]);
+        }
+        for (l, ([i, j, k], times)) in TRIPLES.into_iter().enumerate() {
+            let once = matrix[i][j] * d[k] + matrix[i][k] * d[j] + matrix[j][k] * d[i];
+            let twice = n[i] * d[j] * d[k] + n[j] * d[i] * d[k] + n[k] * d[i] * d[j];
+            self.third[l] += part.third[l] + times * (once / 3.0 + twice / 6.0);
+        }
     }
 
     fn add(&mut self, [a, b, c]: [DVec3; 3]) {
@@ -54,7 +91,6 @@ impl Moments {
         let sum = a + b + c;
         let mean = sum / 3.0;
         let square = |i: usize, j: usize| (a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j]) / 12.0;
-        self.radius = self.radius.max(a.length()).max(b.length()).max(c.length());
         self.first += n;
         for (entry, ([i, j], times)) in self.second.iter_mut().zip(PAIRS) {
             *entry += times * 0.5 * (n[i] * mean[j] + n[j] * mean[i]);
@@ -91,8 +127,8 @@ impl Moments {
     }
 }
 
-/// The mean of the corners where no triangle has an area.
-fn centre_of_area(triangles: &[[DVec3; 3]]) -> DVec3 {
+/// Twice the sum of areas, and their centre: the mean of the corners where no triangle has an area.
+fn area_and_centre(triangles: &[[DVec3; 3]]) -> (f64, DVec3) {
     let (mut area, mut sum) = (0.0, DVec3::ZERO);
     for [a, b, c] in triangles {
         let weight = (b - a).cross(c - a).length();
@@ -100,9 +136,9 @@ fn centre_of_area(triangles: &[[DVec3; 3]]) -> DVec3 {
         sum += weight * (a + b + c) / 3.0;
     }
     if area > 0.0 {
-        return sum / area;
+        return (area, sum / area);
     }
-    triangles.iter().flatten().sum::<DVec3>() / (3 * triangles.len()).max(1) as f64
+    (0.0, triangles.iter().flatten().sum::<DVec3>() / (3 * triangles.len()).max(1) as f64)
 }
 
 #[cfg(test)]
@@ -136,6 +172,16 @@ mod tests {
         let (near, far) = (error_at(10.0), error_at(20.0));
         assert!(near < 1e-5, "{near}");
         assert!(near / far > 24.0, "{near} {far}");
+    }
+
+    #[test]
+    fn a_cluster_of_clusters_is_the_cluster() {
+        let (triangles, whole) = (cluster(), Moments::new(&cluster()));
+        let parts = [Moments::new(&triangles[..2]), Moments::new(&triangles[2..])];
+        let joined = Moments::joined([&parts[0], &parts[1]]).with_radius(&triangles);
+        let (a, b) = ([whole, joined].map(|m| [[m.area, m.radius].as_slice(), &m.second, &m.third].concat())).into();
+        std::iter::zip::<Vec<f64>, Vec<f64>>(a, b).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
+        assert!(whole.centre.distance(joined.centre) < 1e-12 && whole.first.distance(joined.first) < 1e-12);
     }
 
     #[test]

@@ -27,9 +27,16 @@ impl Tree {
         let count = triangles.len();
         let leaves = count.div_ceil(LEAF).next_power_of_two();
         sort(&mut triangles, 0, count, leaves - 1);
-        let node = |k: usize| Moments::new(&triangles[range(k, count)]);
-        let nodes = (0..2 * leaves - 1).into_par_iter().map(node).collect();
-        Self { nodes, triangles, first_leaf: leaves - 1 }
+        let first_leaf = leaves - 1;
+        let mut nodes = vec![Moments::default(); 2 * leaves - 1];
+        let leaf = |(k, node): (usize, &mut Moments)| *node = Moments::new(&triangles[range(first_leaf + k, count)]);
+        nodes[first_leaf..].par_iter_mut().enumerate().for_each(leaf);
+        for k in (0..first_leaf).rev() {
+            nodes[k] = Moments::joined([&nodes[2 * k + 1], &nodes[2 * k + 2]]);
+        }
+        let measured = |(k, node): (usize, &mut Moments)| *node = node.with_radius(&triangles[range(k, count)]);
+        nodes[..first_leaf].par_iter_mut().enumerate().for_each(measured);
+        Self { nodes, triangles, first_leaf }
     }
 
     /// The winding number at `query`; `accuracy` says from how many radii on a cluster's far field stands for it.

@@ -33,7 +33,8 @@ pub(super) fn measure(
     let at = |p: u32| places[frame.local.global[p as usize] as usize - prepared.node_count()];
     let of_joint = |(k, axis): (usize, &Axis)| {
         let (volume, bulge) = frame.measure(k, pose, axis, &at);
-        JointMeasure { bone: active[k].joint.bone, volume, bulge }
+        let joint = active[k].joint;
+        JointMeasure { bone: joint.bone, volume: joint.is_slim.then_some(volume), bulge }
     };
     frame.axes(pose).iter().enumerate().map(of_joint).collect()
 }

@@ -41,8 +41,9 @@ impl Place {
     }
 }
 
-/// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V). `rows` are the source's, empty
-/// where none is asked for; only soft vertices keep anything.
+/// Share of the change along each edge that is kept, in the order of the Laplacian's rows, (V); of two soft vertices the one
+/// with the lower index has it, and the other has 0. `rows` are the source's, empty where none is asked for; only soft
+/// vertices keep anything.
 pub(super) fn kept(
     source: &Source,
     matches: &Matches,
@@ -64,6 +65,9 @@ pub(super) fn kept(
         let Constraint::Soft(_) = constraints[i] else { return };
         let here = mesh.position(i as u32);
         shares.extend(laplacian.neighbours(i).iter().map(|&j| {
+            if (j as usize) < i && matches!(constraints[j as usize], Constraint::Soft(_)) {
+                return 0.0;
+            }
             let length = here.distance(mesh.position(j));
             let steepness = half_l1(rows.of(i), rows.of(j as usize)) * source.size() / length.max(f64::MIN_POSITIVE);
             places[i].trust(&places[j as usize], length, source.size()) / (1.0 + (steepness / STEEP).powi(2))
@@ -73,11 +77,12 @@ pub(super) fn kept(
 
 /// Half the L1 distance of two rows that sum to one: what either has more than the other.
 fn half_l1(first: &[(u32, f64)], second: &[(u32, f64)]) -> f64 {
-    let mut second = second.iter().copied().peekable();
-    let mut more = 0.0;
+    let (mut at, mut more) = (0, 0.0);
     for &(column, value) in first {
-        while second.next_if(|&(other, _)| other < column).is_some() {}
-        let shared = second.next_if(|&(other, _)| other == column).map_or(0.0, |(_, value)| value);
+        while at < second.len() && second[at].0 < column {
+            at += 1;
+        }
+        let shared = second.get(at).filter(|&&(other, _)| other == column).map_or(0.0, |&(_, value)| value);
         more += (value - shared).max(0.0);
     }
     more

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::adjacency::NONE;
 use crate::error::{Error, Result};
-use crate::fill::{Constraint, Fill, Filled, Row, Screen};
+use crate::fill::{Assembled, Constraint, Fill, Filled, Row, Screen};
 use crate::limit::limit;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
@@ -48,6 +48,15 @@ impl Problem {
             MatchMethod::Confidence => 0.0,
         };
         Ok(Self { criteria, smoothness_length, constraints, has_match })
+    }
+
+    /// Poses the problem; what is missing waits to be factored.
+    pub fn assemble(&self, prepared: &mut Inpainting, progress: &Progress) -> Result<Assembled> {
+        let (constraints, fill) = (self.constraints.clone(), &mut prepared.target.fill);
+        match prepared.matches.method() {
+            MatchMethod::ClosestPoint => fill.assemble(constraints, self.smoothness_length, progress),
+            MatchMethod::Confidence => fill.assemble_screened(constraints, progress),
+        }
     }
 
     /// Whether vertex `i` is on an island where anything is known.
@@ -100,11 +109,10 @@ pub(super) fn solve(
 ) -> Result<Transfer> {
     let mut stages = Stages::start();
     let problem = Problem::new(prepared, mask, settings)?;
-    let fill = &mut prepared.target.fill;
-    let assembled = fill.assemble(problem.constraints.clone(), problem.smoothness_length, progress)?;
+    let assembled = problem.assemble(prepared, progress)?;
     let factored_blocks = assembled.missing_blocks();
     stages.end("assemble");
-    fill.factor(assembled, progress)?;
+    prepared.target.fill.factor(assembled, progress)?;
     progress.report(0.7);
     progress.check()?;
     stages.end("factor");

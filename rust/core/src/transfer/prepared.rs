@@ -153,9 +153,8 @@ impl Inpainting {
         let mask = self.prepare_for(mask, settings)?;
         let progress = Progress::default();
         let problem = Problem::new(self, mask.as_deref(), settings)?;
-        let fill = &mut self.target.fill;
-        let assembled = fill.assemble(problem.constraints.clone(), problem.smoothness_length, &progress)?;
-        fill.factor(assembled, &progress)?;
+        let assembled = problem.assemble(self, &progress)?;
+        self.target.fill.factor(assembled, &progress)?;
         let class_of = self.target.expand((0..self.target.fill.unknown().len() as u32).collect());
         let is_unknown = |&i: &u32| self.target.fill.unknown()[class_of[i as usize] as usize];
         let vertices: Vec<u32> = (0..class_of.len() as u32).filter(is_unknown).collect();

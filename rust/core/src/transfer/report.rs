@@ -44,7 +44,7 @@ pub struct Report {
     pub source_unnormalised: usize,
     /// Smallest weight before clamping.
     pub raw_minimum: f64,
-    /// Largest backward error of any block's solve.
+    /// Largest backward error of any block's solve; with the method of confidences what counts as zero there is part of it.
     pub largest_residual: f64,
     /// Distance in force, world units.
     pub max_distance: f64,

@@ -1,6 +1,7 @@
 //! The multifrontal factorisation: each front gathers matrix entries and its children's updates, eliminates its columns
 //! and passes on what is left (Duff and Reid 1983; Liu 1992).
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,7 +12,7 @@ use crate::fronts::buffer::Buffer;
 use crate::fronts::extend_add::{Child, add_children};
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
-use crate::kernels::{Eliminate, Pivot, Product};
+use crate::kernels::{Eliminate, Pivot, Product, Real};
 use crate::ordering::graph::Graph;
 use crate::{Failure, NotPositive, pivot_floor};
 
@@ -33,25 +34,28 @@ impl Work<'_> {
 }
 
 /// Factors the matrix of `graph` along `tree`. Returns all panels, one after the other.
-pub(crate) fn factor(tree: &Tree, graph: &Graph, arch: Arch, stop: &AtomicBool) -> Result<Buffer, Failure> {
+pub(crate) fn factor<R: Real>(tree: &Tree, graph: &Graph, arch: Arch, stop: &AtomicBool) -> Result<Buffer<R>, Failure> {
     let plan = Plan::new(tree, |index| tree.fronts[index].update_len());
     let root = tree.root();
     let mut panels = Buffer::zeroed(tree.fronts[root].subtree_panels);
     let (own, other) = plan.stacks(root);
     let (mut own, mut other) = (Buffer::zeroed(own), Buffer::zeroed(other));
-    let factor = Factor { tree, graph, work: Work { arch, stop } };
+    let factor = Factor { tree, graph, work: Work { arch, stop }, stored: PhantomData::<R> };
     walk(tree, &plan, &factor, root, &mut panels, &mut own, &mut other)?;
     if factor.work.is_over() { Err(Failure::Stopped) } else { Ok(panels) }
 }
 
-struct Factor<'a> {
+struct Factor<'a, R> {
     tree: &'a Tree,
     graph: &'a Graph<'a>,
     work: Work<'a>,
+    stored: PhantomData<R>,
 }
 
-impl Visit for Factor<'_> {
+impl<R: Real> Visit for Factor<'_, R> {
     type Error = Failure;
+    type Stored = R;
+    type Passed = f64;
 
     fn store_len(&self, index: usize) -> usize {
         self.tree.fronts[index].panel_len()
@@ -65,11 +69,23 @@ impl Visit for Factor<'_> {
         self.tree.fronts[index].update_len()
     }
 
-    fn visit(&self, index: usize, panel: &mut [f64], update: &mut [f64], received: Received) -> Result<(), Failure> {
+    fn visit(&self, index: usize, panel: &mut [R], update: &mut [f64], received: Received<f64>) -> Result<(), Failure> {
         if self.work.is_over() {
             return Err(Failure::Stopped);
         }
-        let front = &self.tree.fronts[index];
+        R::fill_stored(panel, |panel| self.front(&self.tree.fronts[index], panel, update, received))
+    }
+}
+
+impl<R: Real> Factor<'_, R> {
+    /// Fills the panel of a front, which is zero, and the update for its parent.
+    fn front(
+        &self,
+        front: &Front,
+        panel: &mut [f64],
+        update: &mut [f64],
+        received: Received<f64>,
+    ) -> Result<(), Failure> {
         self.assemble(front, panel);
         let children: Vec<Child> = front
             .children
@@ -92,9 +108,7 @@ impl Visit for Factor<'_> {
         add_children(&mut update, 0, &children);
         Ok(())
     }
-}
 
-impl Factor<'_> {
     /// Puts the matrix entries of the front's columns into its empty panel.
     fn assemble(&self, front: &Front, panel: &mut [f64]) {
         let end = front.start + front.columns;

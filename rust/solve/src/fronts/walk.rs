@@ -12,6 +12,9 @@ pub(crate) const BRANCHES: usize = 8;
 pub(crate) trait Visit: Sync {
     /// Why a visit may fail.
     type Error: Send;
+    /// Numbers of the store, and those that are passed on.
+    type Stored: Send;
+    type Passed: Send + Sync;
 
     /// Length of the front's own stretch of the store.
     fn store_len(&self, index: usize) -> usize;
@@ -23,19 +26,24 @@ pub(crate) trait Visit: Sync {
     fn passed_len(&self, index: usize) -> usize;
 
     /// Handles a front: `store` is its own, `passed` is to be filled, `received` holds what each child passed on.
-    fn visit(&self, index: usize, store: &mut [f64], passed: &mut [f64], received: Received)
-    -> Result<(), Self::Error>;
+    fn visit(
+        &self,
+        index: usize,
+        store: &mut [Self::Stored],
+        passed: &mut [Self::Passed],
+        received: Received<Self::Passed>,
+    ) -> Result<(), Self::Error>;
 }
 
 /// What the children of a front have passed on.
-pub(crate) struct Received<'a> {
+pub(crate) struct Received<'a, T> {
     plan: &'a Plan,
-    space: &'a [f64],
+    space: &'a [T],
 }
 
-impl<'a> Received<'a> {
+impl<'a, T> Received<'a, T> {
     /// What `child` has passed on.
-    pub(crate) fn from(&self, child: usize, len: usize) -> &'a [f64] {
+    pub(crate) fn from(&self, child: usize, len: usize) -> &'a [T] {
         &self.space[self.plan.offset[child]..][..len]
     }
 }
@@ -93,9 +101,9 @@ pub(crate) fn walk<V: Visit>(
     plan: &Plan,
     visitor: &V,
     root: usize,
-    store: &mut [f64],
-    own: &mut [f64],
-    other: &mut [f64],
+    store: &mut [V::Stored],
+    own: &mut [V::Passed],
+    other: &mut [V::Passed],
 ) -> Result<(), V::Error> {
     let front = &tree.fronts[root];
     let (below, store) = store.split_at_mut(store.len() - visitor.store_len(root));
@@ -119,9 +127,9 @@ fn walk_apart<V: Visit>(
     plan: &Plan,
     visitor: &V,
     roots: &[usize],
-    store: &mut [f64],
-    own: &mut [f64],
-    other: &mut [f64],
+    store: &mut [V::Stored],
+    own: &mut [V::Passed],
+    other: &mut [V::Passed],
 ) -> Result<(), V::Error> {
     match roots {
         [] => Ok(()),

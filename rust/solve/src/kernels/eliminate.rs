@@ -64,7 +64,7 @@ fn eliminate_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
         let place: [(usize, usize); V] = std::array::from_fn(|v| vector_place::<S>(V * group + v));
         let mut x = {
             let done = place.map(|(row, part)| &S::as_simd_f64s(rows[row]).0[part..]);
-            product::<S, V, C>(simd, done, stride, before)
+            product::<S, f64, V, C>(simd, done, stride, before)
         };
         for v in 0..V {
             let (row, part) = place[v];
@@ -74,7 +74,7 @@ fn eliminate_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
                 x[v][c] = simd.sub_f64s(old, x[v][c]);
             }
         }
-        divide(simd, &mut x, pivots);
+        divide::<S, f64, V>(simd, &mut x, pivots);
         for v in 0..V {
             let (row, part) = place[v];
             let now = &mut S::as_mut_simd_f64s(&mut *rows[row]).0[start..];
@@ -102,7 +102,7 @@ impl WithSimd for Pivot<'_> {
         let mut block = pivot_block(now);
         for part in 0..stride {
             let vectors = &S::as_simd_f64s(done).0[part.min(done.len())..];
-            let [sum] = product::<S, 1, BLOCK>(simd, [vectors], stride, done.as_chunks().0);
+            let [sum] = product::<S, f64, 1, BLOCK>(simd, [vectors], stride, done.as_chunks().0);
             let block = S::as_mut_simd_f64s(&mut block).0;
             for c in 0..BLOCK {
                 block[c * stride + part] = simd.sub_f64s(block[c * stride + part], sum[c]);

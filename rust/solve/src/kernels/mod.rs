@@ -10,11 +10,13 @@
 mod add_runs;
 mod eliminate;
 mod multiply;
+mod real;
 mod substitute;
 
 pub(crate) use add_runs::{AddRuns, Run};
 pub(crate) use eliminate::{Eliminate, Pivot};
 pub(crate) use multiply::Product;
+pub(crate) use real::Real;
 pub(crate) use substitute::{Apply, Backward, Forward};
 
 use pulp::Simd;
@@ -22,18 +24,18 @@ use pulp::Simd;
 use crate::fronts::blocks::BLOCK;
 
 /// Row blocks of the factor seen as one operand of a product.
-pub(crate) type RowBlocks<'a> = &'a [&'a [f64]];
+pub(crate) type RowBlocks<'a, R = f64> = &'a [&'a [R]];
 
 /// Sums over p of `a[v][p * stride] * b[p][c]` for all columns, `C` at a time.
 #[inline(always)]
-fn product<S: Simd, const V: usize, const C: usize>(
+fn product<S: Simd, R: Real, const V: usize, const C: usize>(
     simd: S,
-    a: [&[S::f64s]; V],
+    a: [&[R::Vector<S>]; V],
     stride: usize,
-    b: &[[f64; BLOCK]],
-) -> [[S::f64s; BLOCK]; V] {
-    let low = product_of_columns::<S, V, C>(simd, a, stride, b, 0);
-    let high = if C < BLOCK { product_of_columns::<S, V, C>(simd, a, stride, b, C) } else { low };
+    b: &[[R; BLOCK]],
+) -> [[R::Vector<S>; BLOCK]; V] {
+    let low = product_of_columns::<S, R, V, C>(simd, a, stride, b, 0);
+    let high = if C < BLOCK { product_of_columns::<S, R, V, C>(simd, a, stride, b, C) } else { low };
     eight_columns(&low, &high)
 }
 
@@ -51,21 +53,21 @@ fn eight_columns<T: Copy, const V: usize, const C: usize>(low: &[[T; C]; V], hig
 
 /// The same for the columns from `first` on.
 #[inline(always)]
-fn product_of_columns<S: Simd, const V: usize, const C: usize>(
+fn product_of_columns<S: Simd, R: Real, const V: usize, const C: usize>(
     simd: S,
-    a: [&[S::f64s]; V],
+    a: [&[R::Vector<S>]; V],
     stride: usize,
-    b: &[[f64; BLOCK]],
+    b: &[[R; BLOCK]],
     first: usize,
-) -> [[S::f64s; C]; V] {
-    let mut sum = [[simd.splat_f64s(0.0); C]; V];
+) -> [[R::Vector<S>; C]; V] {
+    let mut sum = [[R::splat(simd, R::ZERO); C]; V];
     for (p, b) in b.iter().enumerate() {
-        let b: &[f64; C] = b[first..].first_chunk().expect("first is a multiple of C");
-        let a: [S::f64s; V] = std::array::from_fn(|v| a[v][p * stride]);
+        let b: &[R; C] = b[first..].first_chunk().expect("first is a multiple of C");
+        let a: [R::Vector<S>; V] = std::array::from_fn(|v| a[v][p * stride]);
         for c in 0..C {
-            let factor = simd.splat_f64s(b[c]);
+            let factor = R::splat(simd, b[c]);
             for v in 0..V {
-                sum[v][c] = simd.mul_add_e_f64s(a[v], factor, sum[v][c]);
+                sum[v][c] = R::mul_add(simd, a[v], factor, sum[v][c]);
             }
         }
     }
@@ -79,24 +81,24 @@ fn vector_place<S: Simd>(v: usize) -> (usize, usize) {
 }
 
 /// A block of a panel's triangle on the diagonal, padded to eight columns; pivots are stored inverted.
-fn pivot_block(stored: &[f64]) -> [f64; BLOCK * BLOCK] {
-    let mut block = [0.0; BLOCK * BLOCK];
+fn pivot_block<R: Real>(stored: &[R]) -> [R; BLOCK * BLOCK] {
+    let mut block = [R::ZERO; BLOCK * BLOCK];
     block[..stored.len()].copy_from_slice(stored);
     block
 }
 
 /// Solves `x * pivots^T = x` for the columns x[v][0..8].
 #[inline(always)]
-fn divide<S: Simd, const V: usize>(simd: S, x: &mut [[S::f64s; BLOCK]; V], pivots: &[f64; BLOCK * BLOCK]) {
+fn divide<S: Simd, R: Real, const V: usize>(simd: S, x: &mut [[R::Vector<S>; BLOCK]; V], pivots: &[R; BLOCK * BLOCK]) {
     for c in 0..BLOCK {
-        let inverse = simd.splat_f64s(pivots[BLOCK * c + c]);
+        let inverse = R::splat(simd, pivots[BLOCK * c + c]);
         for v in 0..V {
-            x[v][c] = simd.mul_f64s(x[v][c], inverse);
+            x[v][c] = R::mul(simd, x[v][c], inverse);
         }
         for later in c + 1..BLOCK {
-            let factor = simd.splat_f64s(-pivots[BLOCK * c + later]);
+            let factor = R::splat(simd, -pivots[BLOCK * c + later]);
             for v in 0..V {
-                x[v][later] = simd.mul_add_e_f64s(x[v][c], factor, x[v][later]);
+                x[v][later] = R::mul_add(simd, x[v][c], factor, x[v][later]);
             }
         }
     }

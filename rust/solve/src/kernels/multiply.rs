@@ -98,7 +98,7 @@ fn subtract_tile<S: Simd, const R: usize, const V: usize, const C: usize>(
     for group in 0..R * stride / V {
         let place: [(usize, usize); V] = std::array::from_fn(|v| vector_place::<S>(V * group + v));
         let a = place.map(|(row, part)| S::as_simd_f64s(a[row]).0.get(part..).unwrap_or_default());
-        let sum = product::<S, V, C>(simd, a, stride, b);
+        let sum = product::<S, f64, V, C>(simd, a, stride, b);
         for v in 0..V {
             let (row, part) = place[v];
             let target = S::as_mut_simd_f64s(target[row]).0;

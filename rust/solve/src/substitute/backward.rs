@@ -6,7 +6,7 @@ use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::BRANCHES;
-use crate::kernels::Backward;
+use crate::kernels::{Backward, Real};
 use crate::substitute::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
 
 /// Subtrees with more columns than this are divided between threads, unless there are [`BRANCHES`] larger ones for each.
@@ -15,7 +15,7 @@ const FORK_COLUMNS: usize = 1000;
 const STREAMS: usize = 4;
 
 /// Solves for `x` (n, width) in place, in elimination order.
-pub(crate) fn backward(tree: &Tree, panels: &[f64], arch: Arch, width: usize, x: &mut [f64]) {
+pub(crate) fn backward<R: Real>(tree: &Tree, panels: &[R], arch: Arch, width: usize, x: &mut [R]) {
     let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
     let mut space = vec![0; tree.fronts.len()];
     for (index, front) in tree.fronts.iter().enumerate() {
@@ -55,7 +55,7 @@ struct BackwardPass<'a> {
 
 impl BackwardPass<'_> {
     /// Solves the subtree of `root` given the solution in the root's rows.
-    fn descend(&self, root: usize, panels: &[f64], x: &mut [f64], boundary: &[f64], work: &mut [f64]) {
+    fn descend<R: Real>(&self, root: usize, panels: &[R], x: &mut [R], boundary: &[R], work: &mut [R]) {
         let front = &self.tree.fronts[root];
         let (below, own) = x.split_at_mut(x.len() - front.columns * self.width);
         let (panels, panel) = panels.split_at(panels.len() - front.panel_len());
@@ -63,7 +63,14 @@ impl BackwardPass<'_> {
         self.descend_children(&front.children, panels, below, &Solved { front, own, boundary }, work);
     }
 
-    fn descend_children(&self, roots: &[usize], panels: &[f64], x: &mut [f64], parent: &Solved, work: &mut [f64]) {
+    fn descend_children<R: Real>(
+        &self,
+        roots: &[usize],
+        panels: &[R],
+        x: &mut [R],
+        parent: &Solved<R>,
+        work: &mut [R],
+    ) {
         let sum = |roots: &[usize], of: &dyn Fn(usize) -> usize| roots.iter().map(|&root| of(root)).sum::<usize>();
         match roots {
             [] => {}
@@ -103,7 +110,7 @@ pub(crate) struct Arithmetic {
 
 impl Arithmetic {
     /// Solves for `own` (columns, width) given the solution in the rows under them.
-    pub(crate) fn solve_front(&self, front: &Front, panel: &[f64], own: &mut [f64], boundary: &[f64]) {
+    pub(crate) fn solve_front<R: Real>(&self, front: &Front, panel: &[R], own: &mut [R], boundary: &[R]) {
         let blocks = row_blocks(panel, front);
         let (triangle, lower) = blocks.split_at(front.columns.div_ceil(BLOCK));
         self.subtract_later(lower, boundary, 0, own);
@@ -131,7 +138,7 @@ impl Arithmetic {
 
     /// Subtracts the transposed product of `rows` with their solution `x` from the row blocks `y`, the first of which is
     /// block column `block`.
-    fn subtract_later(&self, rows: &[&[f64]], x: &[f64], block: usize, y: &mut [f64]) {
+    fn subtract_later<R: Real>(&self, rows: &[&[R]], x: &[R], block: usize, y: &mut [R]) {
         if rows.is_empty() || y.is_empty() {
             return;
         }
@@ -155,15 +162,15 @@ impl Arithmetic {
 }
 
 /// A front whose solution is known.
-struct Solved<'a> {
+struct Solved<'a, R> {
     front: &'a Front,
-    own: &'a [f64],
-    boundary: &'a [f64],
+    own: &'a [R],
+    boundary: &'a [R],
 }
 
-impl Solved<'_> {
+impl<R: Real> Solved<'_, R> {
     /// Copies the solution in the rows of `child` to `target`.
-    fn gather(&self, child: &Front, width: usize, target: &mut [f64]) {
+    fn gather(&self, child: &Front, width: usize, target: &mut [R]) {
         for (target, &place) in target.chunks_exact_mut(width).zip(&child.in_parent) {
             let source = match (place as usize).checked_sub(self.front.columns) {
                 None => &self.own[place as usize * width..],
@@ -171,6 +178,6 @@ impl Solved<'_> {
             };
             target.copy_from_slice(&source[..width]);
         }
-        target[child.rows.len() * width..].fill(0.0);
+        target[child.rows.len() * width..].fill(R::ZERO);
     }
 }

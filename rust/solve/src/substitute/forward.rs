@@ -9,16 +9,16 @@ use crate::fronts::blocks::BLOCK;
 use crate::fronts::buffer::Buffer;
 use crate::fronts::tree::{Front, Tree};
 use crate::fronts::walk::{Plan, Received, Visit, walk};
-use crate::kernels::{Apply, Forward};
+use crate::kernels::{Apply, Forward, Real};
 use crate::substitute::substitution::{FORK, PIVOT_BLOCKS, row_blocks};
 
 /// Right-hand sides by front.
-pub(crate) trait Given: Sync {
+pub(crate) trait Given<R>: Sync {
     /// Which columns are not zero in the front's own unknowns, a bit each.
     fn mask(&self, front: usize) -> u64;
 
     /// Puts the rows of the front's own unknowns into `y` (columns of the front, width), which is zero.
-    fn put(&self, front: usize, active: Active, y: &mut [f64]);
+    fn put(&self, front: usize, active: Active, y: &mut [R]);
 }
 
 /// The columns that are not zero in a subtree, in the order in which its fronts store them.
@@ -32,9 +32,9 @@ pub(crate) struct Active {
 }
 
 impl Active {
-    /// Those of `mask`, without gaps.
-    pub(crate) fn of(mask: u64) -> Self {
-        Self { mask, width: (mask.count_ones() as usize).next_multiple_of(BLOCK), in_places: 0 }
+    /// Those of `mask`, without gaps, padded to whole cache lines.
+    pub(crate) fn of<R: Real>(mask: u64) -> Self {
+        Self { mask, width: (mask.count_ones() as usize).next_multiple_of(R::LINE), in_places: 0 }
     }
 
     /// The columns stored, ascending.
@@ -91,11 +91,11 @@ impl std::ops::Deref for Slots {
 
 /// The columns that are not zero so far in each front's subtree, (fronts). Where those are nearly all of a `full` set of
 /// columns (their number and width), all are stored.
-pub(crate) fn activity(tree: &Tree, given: &impl Given, full: Option<(usize, usize)>) -> Vec<Active> {
+pub(crate) fn activity<R: Real>(tree: &Tree, given: &impl Given<R>, full: Option<(usize, usize)>) -> Vec<Active> {
     let mut all: Vec<Active> = Vec::with_capacity(tree.fronts.len());
     for (index, front) in tree.fronts.iter().enumerate() {
         let mask = front.children.iter().fold(given.mask(index), |mask, &child| mask | all[child].mask);
-        let mut active = Active::of(mask);
+        let mut active = Active::of::<R>(mask);
         if let Some((count, _)) = full.filter(|&(_, width)| width == active.width) {
             active.in_places = count;
         }
@@ -105,24 +105,30 @@ pub(crate) fn activity(tree: &Tree, given: &impl Given, full: Option<(usize, usi
 }
 
 /// What fronts pass on to their parents.
-#[derive(Debug, Default)]
-pub(crate) struct Stacks {
-    own: Option<Buffer>,
-    other: Option<Buffer>,
+#[derive(Debug)]
+pub(crate) struct Stacks<R> {
+    own: Option<Buffer<R>>,
+    other: Option<Buffer<R>>,
+}
+
+impl<R> Default for Stacks<R> {
+    fn default() -> Self {
+        Self { own: None, other: None }
+    }
 }
 
 /// Fills `x` in elimination order: (n, `full_width`), all zero before, or the `active` columns of each front, one after the
 /// other.
 #[allow(clippy::too_many_arguments)]
-pub(crate) fn forward(
+pub(crate) fn forward<R: Real>(
     tree: &Tree,
-    panels: &[f64],
+    panels: &[R],
     arch: Arch,
-    given: &impl Given,
+    given: &impl Given<R>,
     active: &[Active],
     full_width: Option<usize>,
-    x: &mut [f64],
-    stacks: &mut Stacks,
+    x: &mut [R],
+    stacks: &mut Stacks<R>,
 ) {
     let mut panel_starts = Vec::with_capacity(tree.fronts.len());
     let mut subtree_store: Vec<usize> = Vec::with_capacity(tree.fronts.len());
@@ -146,9 +152,9 @@ fn passed_len(front: &Front, active: &Active) -> usize {
     front.rows.len().next_multiple_of(BLOCK) * active.width
 }
 
-struct ForwardPass<'a, G> {
+struct ForwardPass<'a, G, R> {
     tree: &'a Tree,
-    panels: &'a [f64],
+    panels: &'a [R],
     panel_starts: Vec<usize>,
     arch: Arch,
     given: &'a G,
@@ -158,8 +164,10 @@ struct ForwardPass<'a, G> {
     subtree_store: Vec<usize>,
 }
 
-impl<G: Given> Visit for ForwardPass<'_, G> {
+impl<R: Real, G: Given<R>> Visit for ForwardPass<'_, G, R> {
     type Error = std::convert::Infallible;
+    type Stored = R;
+    type Passed = R;
 
     fn store_len(&self, index: usize) -> usize {
         self.tree.fronts[index].columns * self.full_width.unwrap_or(self.active[index].width)
@@ -173,14 +181,14 @@ impl<G: Given> Visit for ForwardPass<'_, G> {
         passed_len(&self.tree.fronts[index], &self.active[index])
     }
 
-    fn visit(&self, index: usize, x: &mut [f64], passed: &mut [f64], received: Received) -> Result<(), Self::Error> {
+    fn visit(&self, index: usize, x: &mut [R], passed: &mut [R], received: Received<R>) -> Result<(), Self::Error> {
         let (front, active) = (&self.tree.fronts[index], self.active[index]);
         if active.mask == 0 {
             return Ok(());
         }
         match self.full_width {
             Some(width) if width != active.width => {
-                let mut y = vec![0.0; front.columns * active.width];
+                let mut y = vec![R::ZERO; front.columns * active.width];
                 self.given.put(index, active, &mut y);
                 self.front(index, &mut y, passed, &received);
                 let kept = Slots::of(active.columns());
@@ -190,7 +198,7 @@ impl<G: Given> Visit for ForwardPass<'_, G> {
             }
             full => {
                 if full.is_none() {
-                    x.fill(0.0);
+                    x.fill(R::ZERO);
                 }
                 self.given.put(index, active, x);
                 self.front(index, x, passed, &received);
@@ -200,8 +208,8 @@ impl<G: Given> Visit for ForwardPass<'_, G> {
     }
 }
 
-impl<G: Given> ForwardPass<'_, G> {
-    fn front(&self, index: usize, y: &mut [f64], passed: &mut [f64], received: &Received) {
+impl<R: Real, G: Given<R>> ForwardPass<'_, G, R> {
+    fn front(&self, index: usize, y: &mut [R], passed: &mut [R], received: &Received<R>) {
         let (front, width) = (&self.tree.fronts[index], self.active[index].width);
         self.receive(index, received, |place| (place < front.columns).then_some(place), y);
         let blocks = row_blocks(&self.panels[self.panel_starts[index]..], front);
@@ -213,18 +221,18 @@ impl<G: Given> ForwardPass<'_, G> {
             if first > 0 {
                 apply(self.arch, &triangle[first..last], done, &mut now[..end], width, false);
             }
-            let rest: Vec<&[f64]> = triangle[first..last].iter().map(|row| &row[BLOCK * BLOCK * first..]).collect();
+            let rest: Vec<&[R]> = triangle[first..last].iter().map(|row| &row[BLOCK * BLOCK * first..]).collect();
             self.arch.dispatch(Forward { rows: &rest, y: &mut now[..end], width });
         }
         if front.columns == 0 {
-            passed.fill(0.0);
+            passed.fill(R::ZERO);
         }
         apply(self.arch, lower, y, passed, width, true);
         self.receive(index, received, |place| place.checked_sub(front.columns), passed);
     }
 
     /// Adds what the children passed on to the rows of `target` that `row` gives for places in the front.
-    fn receive(&self, index: usize, received: &Received, row: impl Fn(usize) -> Option<usize>, target: &mut [f64]) {
+    fn receive(&self, index: usize, received: &Received<R>, row: impl Fn(usize) -> Option<usize>, target: &mut [R]) {
         let (front, active) = (&self.tree.fronts[index], &self.active[index]);
         for &child in &front.children {
             let (below, passing) = (&self.tree.fronts[child], &self.active[child]);
@@ -237,9 +245,9 @@ impl<G: Given> ForwardPass<'_, G> {
                 let Some(row) = row(place as usize) else { continue };
                 let target = &mut target[row * active.width..][..active.width];
                 if passing.mask == active.mask || passing.in_places > 0 {
-                    target.iter_mut().zip(values).for_each(|(target, value)| *target += value);
+                    target.iter_mut().zip(values).for_each(|(target, &value)| *target += value);
                 } else {
-                    slots.iter().zip(values).for_each(|(&slot, value)| target[slot] += value);
+                    slots.iter().zip(values).for_each(|(&slot, &value)| target[slot] += value);
                 }
             }
         }
@@ -247,7 +255,7 @@ impl<G: Given> ForwardPass<'_, G> {
 }
 
 /// Subtracts (or stores the negative of) `rows * y`, on several threads where that pays.
-fn apply(arch: Arch, rows: &[&[f64]], y: &[f64], target: &mut [f64], width: usize, overwrite: bool) {
+fn apply<R: Real>(arch: Arch, rows: &[&[R]], y: &[R], target: &mut [R], width: usize, overwrite: bool) {
     if BLOCK * rows.len() * y.len() > FORK && rows.len() > 1 {
         let (above, below) = rows.split_at(rows.len() / 2);
         let (left, right) = target.split_at_mut(BLOCK * above.len() * width);

@@ -13,7 +13,7 @@ use crate::fronts::tree::Tree;
 use crate::fronts::walk::BRANCHES;
 use crate::substitute::backward::Arithmetic;
 use crate::substitute::forward::{Active, Stacks, activity, forward};
-use crate::substitute::rows::{Builder, FrontRows, Place, SparseRows, Sum, noticeable};
+use crate::substitute::rows::{Builder, FrontRows, LINE, Place, SparseRows, Sum, noticeable};
 
 /// Subtrees with more columns than this are divided between threads, unless there are [`BRANCHES`] larger ones for each.
 const FORK_COLUMNS: usize = 1000;
@@ -21,24 +21,25 @@ const FORK_COLUMNS: usize = 1000;
 /// Memory for one solve after the other.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    halfway: Option<Buffer>,
-    stacks: Stacks,
+    halfway: Option<Buffer<f32>>,
+    stacks: Stacks<f32>,
 }
 
 /// Solves for `given` where the solution matters: `least` is the magnitude up to which it counts as zero at each place (n).
 /// Once `stop` is set the answer means nothing.
 pub(crate) fn solve<'f>(
-    (tree, panels, arch): (&'f Tree, &[f64], Arch),
+    (tree, panels, arch): (&'f Tree, &[f32], Arch),
     given: &Sum<'_, 'f>,
-    least: &[f64],
+    least: &[f32],
     work: &mut Workspace,
     stop: &AtomicBool,
 ) -> SparseRows<'f> {
     let active = activity(tree, given, None);
+    let places = in_places_of_parents(tree, &active);
     let length = tree.fronts.iter().zip(&active).map(|(front, active)| front.columns * active.width).sum();
     let halfway = Buffer::at_least(&mut work.halfway, length);
-    forward(tree, panels, arch, given, &active, None, halfway, &mut work.stacks);
-    let (mut panel_starts, mut starts, mut subtree_least) = (Vec::new(), Vec::new(), Vec::<f64>::new());
+    forward(tree, panels, arch, given, &places, None, halfway, &mut work.stacks);
+    let (mut panel_starts, mut starts, mut subtree_least) = (Vec::new(), Vec::new(), Vec::<f32>::new());
     let (mut panel_start, mut start) = (0, 0);
     for (front, active) in tree.fronts.iter().zip(&active) {
         panel_starts.push(panel_start);
@@ -47,27 +48,53 @@ pub(crate) fn solve<'f>(
         start += front.columns * active.width;
         let own = least[front.start..front.start + front.columns].iter().copied();
         let below = front.children.iter().map(|&child| subtree_least[child]);
-        subtree_least.push(own.chain(below).fold(f64::INFINITY, f64::min));
+        subtree_least.push(own.chain(below).fold(f32::INFINITY, f32::min));
     }
     let mut fronts = vec![Place::default(); tree.fronts.len()];
     let (root, halfway) = (tree.root(), &halfway[..]);
     let fork = FORK_COLUMNS.max(tree.order.len() / (BRANCHES * rayon::current_num_threads()));
-    let pass = Backward { tree, panels, panel_starts, arch, active, starts, halfway, least, subtree_least, fork, stop };
+    let pass = Backward {
+        tree,
+        panels,
+        panel_starts,
+        arch,
+        active,
+        places,
+        starts,
+        halfway,
+        least,
+        subtree_least,
+        fork,
+        stop,
+    };
     let mut found = Found::default();
     pass.descend(root, pass.active[root], Vec::new(), &mut fronts, 0, &mut found);
     SparseRows { tree: Some(tree), fronts, chunks: found.rows.into_chunks() }
+}
+
+/// The columns of each front, or those of its parent where they take no more room: what the front passes on is then added
+/// without looking up where each column is.
+fn in_places_of_parents(tree: &Tree, active: &[Active]) -> Vec<Active> {
+    let mut places = active.to_vec();
+    for (index, front) in tree.fronts.iter().enumerate().rev() {
+        let parent = places[index];
+        for &child in front.children.iter().filter(|&&child| active[child].width == parent.width) {
+            places[child] = parent;
+        }
+    }
+    places
 }
 
 /// What a worker has found, and memory that it uses again.
 #[derive(Debug, Default)]
 struct Found {
     rows: Builder,
-    free: Vec<Vec<f64>>,
+    free: Vec<Vec<f32>>,
 }
 
 impl Found {
     /// Memory for so many zeros.
-    fn zeroed(&mut self, len: usize) -> Vec<f64> {
+    fn zeroed(&mut self, len: usize) -> Vec<f32> {
         let mut memory = self.free.pop().unwrap_or_default();
         memory.clear();
         memory.resize(len, 0.0);
@@ -79,17 +106,19 @@ impl Found {
 /// solution around is not negligible.
 struct Backward<'a> {
     tree: &'a Tree,
-    panels: &'a [f64],
+    panels: &'a [f32],
     panel_starts: Vec<usize>,
     arch: Arch,
-    /// What forward substitution has left: columns of each front, where its rows start, and all of them.
+    /// What forward substitution has left: columns of each front, which of them are stored, where its rows start, and all
+    /// rows.
     active: Vec<Active>,
+    places: Vec<Active>,
     starts: Vec<usize>,
-    halfway: &'a [f64],
+    halfway: &'a [f32],
     /// Magnitude that counts as zero, by place.
-    least: &'a [f64],
+    least: &'a [f32],
     /// The smallest of them in each front's subtree.
-    subtree_least: Vec<f64>,
+    subtree_least: Vec<f32>,
     /// Columns of a subtree from which on it is divided between threads.
     fork: usize,
     stop: &'a AtomicBool,
@@ -99,8 +128,8 @@ struct Backward<'a> {
 struct Solved<'a> {
     index: usize,
     active: Active,
-    own: &'a [f64],
-    boundary: &'a [f64],
+    own: &'a [f32],
+    boundary: &'a [f32],
 }
 
 impl Backward<'_> {
@@ -110,7 +139,7 @@ impl Backward<'_> {
         &self,
         index: usize,
         active: Active,
-        boundary: Vec<f64>,
+        boundary: Vec<f32>,
         fronts: &mut [Place],
         first: usize,
         found: &mut Found,
@@ -122,11 +151,16 @@ impl Backward<'_> {
         }
         let width = active.width;
         let mut own = found.zeroed(front.columns * width);
-        let done = self.active[index];
-        let slots = active.slots(&done);
-        let halfway = self.halfway[self.starts[index]..].chunks(done.width.max(1));
-        for (row, halfway) in own.chunks_exact_mut(width).zip(halfway) {
-            slots.iter().zip(halfway).for_each(|(&slot, &value)| row[slot] = value);
+        let (done, stored) = (self.active[index], self.places[index]);
+        let halfway = self.halfway[self.starts[index]..].chunks(stored.width.max(1));
+        if stored.mask == active.mask {
+            let len = own.len();
+            own.copy_from_slice(&self.halfway[self.starts[index]..][..len]);
+        } else {
+            let (from, to) = (stored.slots(&done), active.slots(&done));
+            for (row, halfway) in own.chunks_exact_mut(width).zip(halfway) {
+                from.iter().zip(&*to).for_each(|(&from, &to)| row[to] = halfway[from]);
+            }
         }
         let panel = &self.panels[self.panel_starts[index]..][..front.panel_len()];
         Arithmetic { arch: self.arch, width }.solve_front(front, panel, &mut own, &boundary);
@@ -142,7 +176,7 @@ impl Backward<'_> {
         match roots {
             [] => {}
             &[root] => {
-                let active = Active::of(self.active[root].mask | self.noticeable(root, parent));
+                let active = self.columns(root, parent);
                 let boundary = self.boundary(root, active, parent, found);
                 self.descend(root, active, boundary, fronts, first, found);
             }
@@ -168,12 +202,22 @@ impl Backward<'_> {
     }
 
     /// The rows of the parent's solution under the columns of `child`.
-    fn rows_under<'a>(&'a self, child: usize, parent: &'a Solved) -> impl Iterator<Item = &'a [f64]> {
+    fn rows_under<'a>(&'a self, child: usize, parent: &'a Solved) -> impl Iterator<Item = &'a [f32]> {
         let (columns, width) = (self.tree.fronts[parent.index].columns, parent.active.width);
         self.tree.fronts[child].in_parent.iter().map(move |&place| match (place as usize).checked_sub(columns) {
             None => &parent.own[place as usize * width..][..width],
             Some(row) => &parent.boundary[row * width..][..width],
         })
+    }
+
+    /// The columns that the subtree of `child` is solved for; its parent's where fewer would take as much room.
+    fn columns(&self, child: usize, parent: &Solved) -> Active {
+        let (all, own) = (parent.active, self.active[child].mask);
+        if own != 0 && all.mask | own == all.mask && all.width == LINE {
+            return all;
+        }
+        let active = Active::of::<f32>(own | self.noticeable(child, parent));
+        if all.mask | own == all.mask && all.width == active.width { all } else { active }
     }
 
     /// The columns in which the solution around the subtree of `child` is not negligible.
@@ -183,7 +227,7 @@ impl Backward<'_> {
     }
 
     /// The solution in the rows under the columns of `child`, (rows padded to whole blocks, width).
-    fn boundary(&self, child: usize, active: Active, parent: &Solved, found: &mut Found) -> Vec<f64> {
+    fn boundary(&self, child: usize, active: Active, parent: &Solved, found: &mut Found) -> Vec<f32> {
         let count = self.tree.fronts[child].rows.len().next_multiple_of(BLOCK);
         let mut boundary = found.zeroed(count * active.width);
         if active.mask == 0 {

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::fronts::blocks::{BLOCK, panel_len};
 use crate::fronts::tree::{Front, Tree};
+use crate::kernels::Real;
 use crate::substitute::forward::{Active, Given, Slots};
 use crate::substitute::solution::RightHandSides;
 
@@ -49,25 +50,25 @@ impl ColumnsByFront<'_> {
     }
 }
 
-impl Given for ColumnsByFront<'_> {
+impl<R: Real> Given<R> for ColumnsByFront<'_> {
     fn mask(&self, front: usize) -> u64 {
         self.unknowns(front).iter().fold(0, |mask, &unknown| mask | self.nonzero[unknown as usize])
     }
 
-    fn put(&self, front: usize, active: Active, y: &mut [f64]) {
+    fn put(&self, front: usize, active: Active, y: &mut [R]) {
         let kept = Slots::of(active.columns());
         for (y, &unknown) in y.chunks_exact_mut(active.width).zip(self.unknowns(front)) {
             match self.columns.row(unknown as usize) {
                 None => {}
-                Some(row) if kept.len() == row.len() => y[..row.len()].copy_from_slice(row),
-                Some(row) => kept.iter().zip(y).for_each(|(&column, y)| *y = row[column]),
+                Some(row) if kept.len() == row.len() => y.iter_mut().zip(row).for_each(|(y, &x)| *y = R::of(x)),
+                Some(row) => kept.iter().zip(y).for_each(|(&column, y)| *y = R::of(row[column])),
             }
         }
     }
 }
 
 /// The row blocks of the panel at the start of `panels`, those of its triangle first.
-pub(crate) fn row_blocks<'a>(panels: &'a [f64], front: &Front) -> Vec<&'a [f64]> {
+pub(crate) fn row_blocks<'a, R>(panels: &'a [R], front: &Front) -> Vec<&'a [R]> {
     let k = front.columns;
     let mut panel = &panels[..panel_len(k, front.rows.len())];
     let mut blocks = Vec::with_capacity(k.div_ceil(BLOCK) + front.rows.len().div_ceil(BLOCK));

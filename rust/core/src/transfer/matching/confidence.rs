@@ -67,7 +67,7 @@ pub(super) fn confidence(length: f64, size: f64) -> f32 {
     (1.0 / (1.0 + (length / (HALF_TRUSTED * size)).powi(2))) as f32
 }
 
-/// The point chosen for one vertex, several if they tie.
+/// The point chosen for one vertex, several if they tie; none if it is the closest one.
 struct Choice {
     points: Vec<(SurfacePoint, f64)>,
     gap: f64,
@@ -105,36 +105,79 @@ struct Search<'a> {
 impl Search<'_> {
     /// The points of these vertices; with `both_ways` either direction of their normals will do.
     fn choices(&self, vertices: &[u32], both_ways: bool) -> Vec<Choice> {
-        let (source, target, size) = (self.source, &self.target, self.size);
+        // Most find nothing clearly cheaper; only for those that do, all is searched for that costs nearly as little.
+        let bounds = vertices.par_iter().with_min_len(1024).map(|&i| self.bound(i as usize, both_ways)).collect();
+        let decide = |i: usize, found: &[Priced]| match self.cheaper(i, found) {
+            None => Ok(self.choice(i, found)),
+            Some(least) => Err(Bound { near: self.near(i), cost: SLACK * least }),
+        };
+        let mut decided = self.cheapest(vertices, bounds, 1.0, both_ways, decide);
+        let moving =
+            decided.iter().enumerate().filter_map(|(k, choice)| choice.as_ref().err().map(|&bound| (k, bound)));
+        let (moving, bounds): (Vec<usize>, Vec<Bound>) = moving.unzip();
+        let again: Vec<u32> = moving.iter().map(|&k| vertices[k]).collect();
+        let moved = self.cheapest(&again, bounds, SLACK, both_ways, |i, found| self.choice(i, found));
+        std::iter::zip(moving, moved).for_each(|(k, choice)| decided[k] = Ok(choice));
+        decided.into_iter().map(|choice| choice.unwrap_or_else(|_| unreachable!("it was searched for again"))).collect()
+    }
+
+    /// What `finish` makes of the cheapest points of these vertices, which it is told.
+    fn cheapest<T: Send>(
+        &self,
+        vertices: &[u32],
+        bounds: Vec<Bound>,
+        slack: f64,
+        both_ways: bool,
+        finish: impl Fn(usize, &[Priced]) -> T + Sync,
+    ) -> Vec<T> {
         let at = |k: usize| vertices[k] as usize;
-        let cost = |k: usize, point: &SurfacePoint| {
-            let cosine = cosine(source, point, target.normals[at(k)]);
-            let either = both_ways || target.two_sided[at(k)];
-            cost(point.distance, if either { cosine.map(f64::abs) } else { cosine }, size)
+        let queries: Vec<[f32; 3]> = vertices.iter().map(|&i| self.target.positions[i as usize]).collect();
+        let cost = |k: usize, point: &SurfacePoint| self.cost(at(k), point, both_ways);
+        self.source.index().cheapest_points(&queries, &bounds, slack, cost, |k, found| finish(at(k), found))
+    }
+
+    fn cost(&self, i: usize, point: &SurfacePoint, both_ways: bool) -> f64 {
+        let cosine = cosine(self.source, point, self.target.normals[i]);
+        let either = both_ways || self.target.two_sided[i];
+        cost(point.distance, if either { cosine.map(f64::abs) } else { cosine }, self.size)
+    }
+
+    /// Squared distance within which everything is as near to vertex `i` as its closest point.
+    fn near(&self, i: usize) -> f64 {
+        (self.closest[i].distance + EQUALLY_NEAR * self.size).powi(2)
+    }
+
+    /// Where the search for something clearly cheaper than the closest point ends.
+    fn bound(&self, i: usize, both_ways: bool) -> Bound {
+        let point = &self.closest[i];
+        let own = self.cost(i, point, both_ways);
+        let cost = if may_move(own, point.distance, self.size) { HYSTERESIS * own } else { 0.0 };
+        Bound { near: self.near(i), cost }
+    }
+
+    /// The least cost of what was found for vertex `i`, if the nearest points are left for it.
+    fn cheaper(&self, i: usize, found: &[Priced]) -> Option<f64> {
+        cheaper(found, self.closest[i].distance, self.size).1
+    }
+
+    /// What vertex `i` takes of what was found.
+    fn choice(&self, i: usize, found: &[Priced]) -> Choice {
+        let mut choice = choose(self.source, found, self.closest[i].distance, self.size);
+        choice.cosine = match &choice.points[..] {
+            [] => self.agreement(i, &self.closest[i]),
+            points => points.iter().map(|(point, share)| share * self.agreement(i, point)).sum(),
         };
-        let bound = |(k, &i): (usize, &u32)| {
-            let point = &self.closest[i as usize];
-            let own = cost(k, point);
-            let near = point.distance + EQUALLY_NEAR * size;
-            let cost = if may_move(own, point.distance, size) { SLACK * HYSTERESIS * own } else { 0.0 };
-            Bound { near: near * near, cost }
-        };
-        let bounds: Vec<Bound> = vertices.par_iter().with_min_len(1024).enumerate().map(bound).collect();
-        let queries: Vec<[f32; 3]> = vertices.iter().map(|&i| target.positions[i as usize]).collect();
-        let finish = |k: usize, found: &[Priced]| {
-            let i = at(k);
-            let mut choice = choose(source, found, self.closest[i].distance, size);
-            let agreement = |(point, share): &(SurfacePoint, f64)| {
-                let there = blend(source, point);
-                let sides = self.around.around(i).iter().filter_map(|&t| self.sides[t as usize]);
-                let cosines =
-                    std::iter::once(target.normals[i]).chain(sides).filter_map(|normal| between(there, normal));
-                share * cosines.map(f64::abs).reduce(f64::max).unwrap_or(1.0)
-            };
-            choice.cosine = choice.points.iter().map(agreement).sum();
-            choice
-        };
-        source.index().cheapest_points(&queries, &bounds, SLACK, cost, finish)
+        choice
+    }
+
+    /// Cosine between the source's normal at a point and the direction of vertex `i`, or of a triangle around it, that agrees
+    /// best.
+    fn agreement(&self, i: usize, point: &SurfacePoint) -> f64 {
+        let Some(there) = blend(self.source, point).try_normalize() else { return 1.0 };
+        let own = Some(self.target.normals[i]).filter(|&normal| normal != Vec3::ZERO);
+        let sides = self.around.around(i).iter().filter_map(|&t| self.sides[t as usize]);
+        let cosines = own.into_iter().chain(sides).map(|normal| there.dot(normal.as_dvec3()).abs());
+        cosines.reduce(f64::max).map_or(1.0, |cosine| cosine.min(1.0))
     }
 
     /// The vertices, ascending, that have left a face which looks the other way, but lie in a patch among others that stay on
@@ -204,21 +247,33 @@ fn side(target: &TargetSurface<'_>, triangle: &[u32; 3]) -> Option<Vec3> {
     (b - a).cross(c - a).try_normalize().map(DVec3::as_vec3)
 }
 
+/// Whether a point is as near as the closest one, at this distance.
+fn is_near(p: &Priced, distance: f64, size: f64) -> bool {
+    p.point.distance * p.point.distance <= (distance + EQUALLY_NEAR * size).powi(2)
+}
+
+/// The least cost of the nearest points, and that of all if they are left for it: if others cost clearly less.
+fn cheaper(found: &[Priced], distance: f64, size: f64) -> (f64, Option<f64>) {
+    let (mut least_near, mut least) = (f64::INFINITY, f64::INFINITY);
+    for p in found {
+        least = least.min(p.cost);
+        if is_near(p, distance, size) {
+            least_near = least_near.min(p.cost);
+        }
+    }
+    let moves = may_move(least_near, distance, size) && least < HYSTERESIS * least_near;
+    (least_near, moves.then_some(least))
+}
+
 /// Keeps the nearest points unless others cost clearly less, and averages what ties.
 fn choose(source: &Source, found: &[Priced], distance: f64, size: f64) -> Choice {
     if let [only] = found {
-        return Choice { points: vec![(only.point, 1.0)], gap: only.point.distance, cosine: 1.0 };
+        return Choice { points: Vec::new(), gap: only.point.distance, cosine: 1.0 };
     }
-    let near = (distance + EQUALLY_NEAR * size).powi(2);
-    let is_near = |p: &Priced| p.point.distance * p.point.distance <= near;
-    let least = |among: &dyn Fn(&Priced) -> bool| {
-        found.iter().filter(|&p| among(p)).map(|p| p.cost).fold(f64::INFINITY, f64::min)
-    };
-    let (least_near, least_of_all) = (least(&is_near), least(&|_| true));
-    let moves = may_move(least_near, distance, size) && least_of_all < HYSTERESIS * least_near;
-    let best = if moves { least_of_all } else { least_near };
+    let (least_near, least) = cheaper(found, distance, size);
+    let (moves, best) = (least.is_some(), least.unwrap_or(least_near));
     let smallest = (EQUALLY_NEAR * size).powi(2);
-    let tied = found.iter().filter(|p| (moves || is_near(p)) && p.cost <= SLACK * best + smallest);
+    let tied = found.iter().filter(|p| (moves || is_near(p, distance, size)) && p.cost <= SLACK * best + smallest);
     let weight =
         |p: &Priced| source.area(p.point.triangle) * (-(p.cost - best) / (2.0 * TIE * TIE * (best + smallest))).exp();
     let weighed: Vec<_> = tied.map(|p| (p.point, weight(p))).collect();

@@ -137,7 +137,7 @@ fn screened(
     let of_region = |i: usize| if region.contains[i] { known[i] } else { Constraint::Fixed };
     let constraints: Vec<Constraint> = (0..known.len()).map(of_region).collect();
     let fill = &mut prepared.target.fill;
-    let assembled = fill.assemble(constraints.clone(), 0.0, progress)?;
+    let assembled = fill.assemble_screened(constraints.clone(), progress)?;
     let factored_blocks = assembled.missing_blocks();
     fill.factor(assembled, progress)?;
     progress.report(0.5);
