@@ -291,8 +291,8 @@ impl Fill {
         })
     }
 
-    /// Solves the problem posed last by [`Self::assemble_screened`], with confidences from [`screened::confidence`], such that every soft row is
-    /// trusted over its length. `screen` has the [table](Self::row_table) of the `given` rows, and what else there is to it.
+    /// Solves the problem posed last by [`Self::assemble_screened`], with confidences from [`screened::confidence`], such that every
+    /// soft row is trusted over its length. `screen` has the [table](Self::row_table) of the `given` rows, and what else there is.
     ///
     /// # Errors
     /// Those of [`Fill::solve`].

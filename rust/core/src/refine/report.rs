@@ -24,8 +24,8 @@ pub struct JointReport {
 pub struct JointMeasure {
     /// The bone below the joint.
     pub bone: usize,
-    /// Volume of the joint's region against rest: -0.02 is 2 % lost. None for shoulders and the like: beside a body's trunk there is
-    /// no volume about a joint.
+    /// Volume of the joint's region against rest: -0.02 is 2 % lost. None for shoulders and the like: beside a body's trunk there
+    /// is no volume about a joint.
     pub volume: Option<f64>,
     /// Farthest that skin is from its bone, as a multiple of the distance at rest.
     pub bulge: f64,
