@@ -18,6 +18,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,12 +76,13 @@ def work(size: str, methods: list[str], turns: int) -> None:
     rows = sp.csr_matrix(source.weights)
     arrays = (rows.indptr.astype(np.uint32), rows.indices.astype(np.uint32), rows.data.astype(np.float32))
     geometry = (source.positions, source.triangles)
-    taken = {kind: {method: [] for method in methods} for kind in ("cpu", "wall")}
+    taken: dict[str, dict[str, list[float]]] = {kind: {method: [] for method in methods} for kind in ("cpu", "wall")}
     for turn in range(turns + (turns > 1)):
         for method in methods:
             weights = native.Weights(*arrays, rows.shape[1])
             wall, cpu = time.perf_counter(), time.process_time()
-            native.transfer_weights(*geometry, weights, target.positions, target.triangles, method=method)
+            settings: Any = {"method": method}
+            native.transfer_weights(*geometry, weights, target.positions, target.triangles, **settings)
             if turn or turns == 1:
                 taken["cpu"][method].append(time.process_time() - cpu)
                 taken["wall"][method].append(time.perf_counter() - wall)
