@@ -100,7 +100,7 @@ def _read_target(obj: bpy.types.Object, rig: bpy.types.Object, bones: RestBones,
         )
     chosen = _chosen(obj, rig, bones, computed, params)
     share = _share(obj, params, {name for name, taken in zip(bones.names, computed, strict=True) if taken})
-    shape = _shape(obj, params)
+    shape, opposite = _shape(obj, params), sides.opposites(rig, bones.names)
     partial = not chosen.all() or params.mix_factor < 1 or bool(params.mask_group)
     target = Target(
         object=obj,
@@ -108,14 +108,12 @@ def _read_target(obj: bpy.types.Object, rig: bpy.types.Object, bones: RestBones,
         bones=bones,
         computed=computed,
         chosen=chosen,
-        opposite=_opposite_columns(rig, bones.names),
-        completion=_completed(obj, rig, bones.names, shape, params),
+        opposite=_opposite_columns(opposite, bones.names),
+        completion=_completed(obj, rig, opposite, shape, params),
         before=vertex_groups.read(obj, bones.names if partial else []),
         share=share,
         vertices=_vertices(obj, share, params),
-        mirror_warning=mirror.warning(
-            obj, shape.matrix, shape.geometry.positions, rig, sides.opposites(rig, bones.names)
-        ),
+        mirror_warning=mirror.warning(obj, shape.matrix, shape.geometry.positions, rig, opposite),
     )
     _check_locks(target, locks)
     return target
@@ -152,15 +150,12 @@ def _share(obj: bpy.types.Object, params: AutoskinParams, written: set[str]) -> 
             f"The mask of {obj.name} is its group {params.mask_group}, which would be overwritten with weights: "
             "pick another group as mask, or rename it"
         )
-    rows = vertex_groups.read(obj, [params.mask_group])
-    share = np.zeros(len(rows.indptr) - 1)
-    share[np.diff(rows.indptr) > 0] = rows.values
+    share = vertex_groups.values(obj, params.mask_group).astype(np.float64)
     return np.clip(share, 0, 1) * params.mix_factor
 
 
-def _opposite_columns(rig: bpy.types.Object, names: list[str]) -> NDArray[np.int64]:
+def _opposite_columns(opposite: dict[str, str], names: list[str]) -> NDArray[np.int64]:
     index = {name: column for column, name in enumerate(names)}
-    opposite = sides.opposites(rig, names)
     return np.array([index.get(opposite[name], index[name]) for name in names], np.int64)
 
 
@@ -172,12 +167,11 @@ def _shape(obj: bpy.types.Object, params: AutoskinParams) -> shapes.Shape:
 
 
 def _completed(
-    obj: bpy.types.Object, rig: bpy.types.Object, names: list[str], shape: shapes.Shape, params: AutoskinParams
+    obj: bpy.types.Object, rig: bpy.types.Object, opposite: dict[str, str], shape: shapes.Shape, params: AutoskinParams
 ) -> Completion:
     """With the halves that Mirror modifiers add, if the weights that these give them are the right ones."""
-    known = sides.opposites(rig, names)
     found = mirror.reflections(obj, shape.matrix, shape.geometry.positions)
-    reflections = [reflection for reflection in found if mirror.is_right(reflection, rig, known)]
+    reflections = [reflection for reflection in found if mirror.is_right(reflection, rig, opposite)]
     done = completion.complete(shape.geometry, reflections)
     if params.symmetrize:
         to_middle = np.linalg.inv(np.array(rig.matrix_world))

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from ..scene.rest_bones import RestBones
 from . import bone_names, chains
 
+# Where the bones of both rigs lie in the body, (B, 6) each.
+Places = tuple[NDArray, NDArray]
 # How a partner was found, how sure that is, and what two names must have in common.
 Rule = tuple[str, float, Callable[[list[str]], dict[str, object]]]
 
@@ -32,8 +34,9 @@ def match(source: RestBones, target: RestBones, given: Mapping[str, str] | None 
     found = {name: BoneMatch(name, given[name], "given", 1.0) for name in target.names if name in given}
     for how, confidence, key in _rules(source.names, target.names):
         _match_by_key(source.names, target.names, found, how, confidence, key)
-    _follow_the_chains(source, target, found)
-    _match_by_place(source, target, found)
+    places = (_relative(source), _relative(target))
+    _follow_the_chains(source, target, found, places)
+    _match_by_place(source, target, found, places)
     nothing = "no partner"
     return [found.get(name, BoneMatch(name, "", nothing, 0.0)) for name in target.names]
 
@@ -88,16 +91,15 @@ def _unique_names(keys: dict[str, object]) -> dict[str, object]:
     return {name: value for value, name in _unique(keys).items()}
 
 
-def _follow_the_chains(source: RestBones, target: RestBones, found: dict[str, BoneMatch]) -> None:
+def _follow_the_chains(source: RestBones, target: RestBones, found: dict[str, BoneMatch], places: Places) -> None:
     """Corrects partners by name that leave a bone over above in one rig and below in the other."""
     partner = {entry.target: entry.source for entry in found.values() if entry.source}
-    places = (_relative(source), _relative(target))
     given = {name for name, entry in found.items() if entry.how == "given"}
     for name, other in chains.shifted(source, target, partner, given, places).items():
         found[name] = BoneMatch(name, other, "place", 0.6)
 
 
-def _match_by_place(source: RestBones, target: RestBones, found: dict[str, BoneMatch]) -> None:
+def _match_by_place(source: RestBones, target: RestBones, found: dict[str, BoneMatch], places: Places) -> None:
     """Pairs what is left by where it lies in the body, the closest first, among bones of one side whose nearest mapped
     ancestors are partners."""
     taken = {entry.source for entry in found.values()}
@@ -105,7 +107,6 @@ def _match_by_place(source: RestBones, target: RestBones, found: dict[str, BoneM
     free_source = [i for i, name in enumerate(source.names) if name not in taken]
     if not free_target or not free_source:
         return
-    places = [_relative(bones) for bones in (source, target)]
     partner = {entry.target: entry.source for entry in found.values() if entry.source}
     above_source = _mapped_ancestors(source, set(partner.values()))
     above_target = _mapped_ancestors(target, set(partner))

@@ -8,7 +8,7 @@ from . import armature, stack
 def attach(obj: bpy.types.Object, source: bpy.types.Object) -> list[str]:
     """Let the armatures that deform `source` deform `obj`: by modifiers of the same settings. Returns their names."""
     place = stack.place_of_armature(obj, [source])
-    models = [m for m in source.modifiers if m.type == "ARMATURE" and m.object and m.show_viewport]
+    models = [model for model in armature.modifiers(source) if model.show_viewport]
     added = []
     for rig in [m.object for m in models] or [armature.find(source)]:
         added.append(_add_modifier(obj, rig, place))

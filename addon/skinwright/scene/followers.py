@@ -107,12 +107,12 @@ def _armatures(obj: bpy.types.Object, binding: _Binding) -> list[Follower]:
     """Armature modifiers that are not bound as the source is; ending one removes it."""
     models, rigs = [model for model in binding.models if model.show_viewport], binding.rigs
     found: list[tuple[tuple, tuple[str, bpy.types.ArmatureModifier]]] = []
-    seen = [(model.object, _binding(model)) for model in models]
+    seen = [(model.object, _settings(model)) for model in models]
     for modifier in armature.modifiers(obj):
         if not modifier.show_viewport and (modifier.object in rigs or not modifier.show_render):
             continue  # told by _switched_off, or it does nothing
         phrase = _binding_phrase(modifier, models, rigs)
-        bound = (modifier.object, _binding(modifier))
+        bound = (modifier.object, _settings(modifier))
         if not phrase and bound not in seen and bound in [b for b, _ in found]:
             phrase = f"is deformed by {modifier.object.name} twice, the second time by the modifier {modifier.name}"
         if bound in seen:
@@ -154,8 +154,8 @@ def _binding_phrase(
 ) -> str:
     if rigs and modifier.object not in rigs:
         return f"is deformed by {modifier.object.name} and not by {rigs[0].name}"
-    bindings = [_binding(model) for model in models if model.object == modifier.object]
-    if _binding(modifier) in bindings or (not bindings and _is_plain(modifier)):
+    bindings = [_settings(model) for model in models if model.object == modifier.object]
+    if _settings(modifier) in bindings or (not bindings and _is_plain(modifier)):
         return ""
     name = f"has the modifier {modifier.name}, which"
     if not modifier.use_vertex_groups:
@@ -167,7 +167,7 @@ def _binding_phrase(
     return f"{name} has other settings than that of {models[0].id_data.name}" if models else ""
 
 
-def _binding(modifier: bpy.types.ArmatureModifier) -> tuple:
+def _settings(modifier: bpy.types.ArmatureModifier) -> tuple:
     return tuple(getattr(modifier, name) for name in armature.BINDING)
 
 

@@ -69,7 +69,7 @@ def shaping_the_pose(obj: bpy.types.Object, sources: Sequence[bpy.types.Object])
 
 
 def move(obj: bpy.types.Object, name: str, place: int) -> None:
-    """Move a modifier that was just added up the stack; those that Blender keeps at the end may come after it."""
+    """Move a modifier up the stack to this place. A new one need not be the last: Blender keeps some at the end."""
     index = obj.modifiers.find(name)
     obj.modifiers.move(index, min(place, index))
 

@@ -118,10 +118,8 @@ def write(obj: bpy.types.Object, names: Sequence[str], rows: Rows, vertices: NDA
     owned = np.array([group.index for group in ensure(obj, names)], np.uint32)
     mesh = obj.data
     indices = np.arange(len(mesh.vertices), dtype=np.int64) if vertices is None else np.asarray(vertices)
-    held, wanted = (
-        _memberships(mesh, indices),
-        Memberships(rows.indptr.astype(np.int64), owned[rows.bones], rows.values),
-    )
+    held = _memberships(mesh, indices)
+    wanted = Memberships(rows.indptr.astype(np.int64), owned[rows.bones], rows.values)
     if not _are_members(held, wanted) and _change_members(obj, indices, held, owned, wanted):
         held = _memberships(mesh, indices)
     _set_weights(mesh, indices, held, wanted)
