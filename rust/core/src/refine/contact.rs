@@ -115,7 +115,13 @@ impl Contact {
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
     /// which is the outer one cannot be told: pushing and smoothing would eat them up.
-    fn own_pairs(&self, skin: &dyn Skin, places: &[Vec3], among: Suspects<'_>, slabs: &Slabs) -> Vec<[u32; 2]> {
+    pub(super) fn own_pairs(
+        &self,
+        skin: &dyn Skin,
+        places: &[Vec3],
+        among: Suspects<'_>,
+        slabs: &Slabs,
+    ) -> Vec<[u32; 2]> {
         let mut pairs = self.pairs(skin, places, among, slabs);
         pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
         pairs
@@ -205,14 +211,16 @@ impl Contact {
     }
 }
 
-fn corners(skin: &dyn Skin, pairs: &[[u32; 2]]) -> Vec<u32> {
+/// The vertices of these pairs, ascending.
+pub(super) fn corners(skin: &dyn Skin, pairs: &[[u32; 2]]) -> Vec<u32> {
     let mut corners: Vec<u32> = pairs.iter().flatten().flat_map(|&t| skin.triangles()[t as usize]).collect();
     corners.sort_unstable();
     corners.dedup();
     corners
 }
 
-fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
+/// Vertices with some rings around, ascending.
+pub(super) fn grown(skin: &dyn Skin, mut vertices: Vec<u32>, rings: usize) -> Vec<u32> {
     for _ in 0..rings {
         let ring: Vec<u32> = vertices.iter().flat_map(|&i| skin.ring(i)).copied().collect();
         vertices.extend(ring);

@@ -55,8 +55,9 @@ impl Frame<'_> {
         }
         clock.time("contact", || {
             if self.undo_harm(pose, &axes, &lost, left) {
-                self.part(&suspects, &[]);
+                left = self.part(&suspects, &[]).1;
             }
+            self.unfold(pose, left);
         });
         self.clock = clock;
     }

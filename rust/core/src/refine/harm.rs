@@ -18,9 +18,8 @@ impl Frame<'_> {
     pub(super) fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], missing: &[f64], left: usize) -> bool {
         let lost =
             |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
-        let may_harm = |&k: &usize| {
-            self.is_measured(k, pose) && (left > 0 || missing[k].is_nan() || missing[k].abs() > HARM / 2.0)
-        };
+        let is_restored = |k: usize| missing[k].abs() <= HARM / 2.0;
+        let may_harm = |&k: &usize| self.is_measured(k, pose) && (left > 0 || !is_restored(k));
         let solved = self.places();
         let doubtful: Vec<usize> = (0..self.active.len()).filter(may_harm).collect();
         let suspects: Vec<usize> = doubtful.into_iter().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();

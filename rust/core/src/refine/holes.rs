@@ -1,5 +1,5 @@
-//! The openings of a surface, each closed by a fan around the middle of its rim: a sleeve, a trouser leg or a body without
-//! hands encloses a volume, which then depends on no origin.
+//! The openings of a surface, each closed by a fan around the middle of its rim: a sleeve, a trouser leg or a body
+//! without hands encloses a volume, which then depends on no origin.
 
 use glam::DVec3;
 
@@ -8,8 +8,8 @@ use crate::adjacency::DisjointSets;
 /// Sides of triangles without a triangle on the other side, from vertex to vertex as their triangle has them.
 pub(super) type Rim = Vec<[u32; 2]>;
 
-/// The rims of `triangles` over `count` vertices. Rims that touch are one. Every sum of triangles has a closed boundary, so
-/// fans close whatever is not manifold or not wound consistently too.
+/// The rims of `triangles` over `count` vertices. Rims that touch are one. Every sum of triangles has a closed boundary,
+/// so fans also close what is not manifold or not wound consistently.
 pub(super) fn rims(triangles: &[[u32; 3]], count: usize) -> Vec<Rim> {
     let sides = bare_sides(triangles);
     let mut sets = DisjointSets::new(count);

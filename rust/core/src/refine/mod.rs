@@ -36,6 +36,7 @@ mod solver;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod unfold;
 mod whole;
 
 use glam::{DAffine3, Vec3};
