@@ -12,10 +12,10 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-def tube(around=16, along=24):
-    """A capped tube of radius 0.25 along x, and its two-bone armature."""
-    x, angle = np.linspace(-1, 1, along + 1), np.arange(around) * 2 * np.pi / around
-    positions = [(u, 0.25 * np.cos(a), 0.25 * np.sin(a)) for u in x for a in angle] + [(-1, 0, 0), (1, 0, 0)]
+def tube(around=16, along=24, reach=2.0):
+    """A capped tube of radius 0.25 along x, and its two-bone armature. Cells are a share of the size: a long tube has few."""
+    x, angle = np.linspace(-reach, reach, along + 1), np.arange(around) * 2 * np.pi / around
+    positions = [(u, 0.25 * np.cos(a), 0.25 * np.sin(a)) for u in x for a in angle] + [(-reach, 0, 0), (reach, 0, 0)]
     faces, ends = [], (len(positions) - 2, len(positions) - 1)
     for j in range(around):
         k = (j + 1) % around
@@ -27,7 +27,7 @@ def tube(around=16, along=24):
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     upper, lower = (rig.data.edit_bones.new(name) for name in ("Upper", "Lower"))
-    upper.head, upper.tail, lower.head, lower.tail = (-1, 0, 0), (0, 0, 0), (0, 0, 0), (1, 0, 0)
+    upper.head, upper.tail, lower.head, lower.tail = (-reach, 0, 0), (0, 0, 0), (0, 0, 0), (reach, 0, 0)
     lower.parent = upper
     bpy.ops.object.mode_set(mode="OBJECT")
     t = np.clip((np.array([p[0] for p in positions]) + 0.25) / 0.5, 0, 1)

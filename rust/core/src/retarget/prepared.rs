@@ -129,8 +129,8 @@ impl<'a> Prepared<'a> {
             },
             &landmarks,
             self.correspondence.landmarks.len(),
-        );
-        progress.check()?;
+            progress,
+        )?;
         let mut count = 0;
         for (blend, &u) in std::iter::zip(blends, &self.target.of_vertex) {
             if let Some(blend) = blend {
