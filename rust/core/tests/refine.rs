@@ -200,6 +200,12 @@ fn bad_input_is_a_sentence() {
     assert!(matches!(refiner(&flat, Settings::default()), Err(Error::NothingInside)));
     let point = Limb { positions: vec![[0.0; 3]; good.positions.len()], ..limb(12, 12) };
     assert!(matches!(refiner(&point, Settings::default()), Err(Error::NothingInside)));
+    for size in [0.9, 1.0, 1.1, 3.0] {
+        let positions = good.positions.iter().map(|p| p.map(|x| size * x)).collect();
+        let triangles = good.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let inside_out = Limb { positions, triangles, ..limb(12, 12) };
+        assert!(matches!(refiner(&inside_out, Settings::default()), Err(Error::NothingInside)), "size {size}");
+    }
     let mut broken = limb(12, 12);
     broken.positions[3][1] = f32::NAN;
     assert!(matches!(refiner(&broken, Settings::default()), Err(Error::PositionNotFinite { vertex: 3, .. })));
