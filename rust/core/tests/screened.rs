@@ -1,0 +1,81 @@
+//! Screened filling against the four dense solves that it stands for.
+
+#[allow(dead_code)]
+mod common;
+#[allow(dead_code)]
+#[path = "common/dense.rs"]
+mod dense;
+#[allow(dead_code)]
+#[path = "common/sheet.rs"]
+mod sheet;
+
+use common::noise;
+use dense::{Matrix, solved, stiffness_and_masses};
+use sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, sheet};
+use skinwright_core::Progress;
+use skinwright_core::fill::{Constraint, Fill, Ragged, Screen, screened};
+
+#[test]
+fn a_screened_solve_takes_the_four_steps_that_are_written_down() {
+    let mesh = sheet();
+    let (stiffness, masses) = stiffness_and_masses(&mesh);
+    let constraint = |i: usize| match mixed(i) {
+        Constraint::Soft(x) => Constraint::Soft(screened::confidence(masses[i], 1.0 + 2.0 * x)),
+        other => other,
+    };
+    let constraints: Vec<_> = (0..30).map(constraint).collect();
+    let mut fill = Fill::new(mesh.positions.clone(), mesh.triangles.clone(), None).unwrap();
+    let progress = Progress::default();
+    let assembled = fill.assemble_screened(constraints.clone(), &progress).unwrap();
+    fill.factor(assembled, &progress).unwrap();
+    // The share of an edge's change that is kept, as either end says it; the lower index decides.
+    let share = |i: usize, j: usize| 0.8 * noise(i as u64, 100 + j as u64);
+    let is_soft = |i: usize| matches!(constraints[i], Constraint::Soft(_));
+    let neighbours = |i: usize| fill.laplacian().neighbours(i).to_vec();
+    let list = |i: usize, out: &mut Vec<f64>| out.extend(neighbours(i).iter().map(|&j| share(i, j as usize)));
+    let kept = Ragged::new(30, |i, out| {
+        if is_soft(i) {
+            list(i, out)
+        }
+    });
+    let rows = fill.row_table(&push_given);
+    let screen = Screen { rows: &rows, kept: &kept, patch: None, with_all_solves: true };
+    let filled = fill.solve_screened(&push_given, screen, &progress).unwrap();
+
+    let unknowns: Vec<usize> = (0..30).filter(|&i| constraints[i] != Constraint::Fixed).collect();
+    let c = |i: usize| confidence(constraints[i]);
+    let matrix: Matrix = unknowns
+        .iter()
+        .map(|&i| unknowns.iter().map(|&j| stiffness[i][j] + if i == j { c(i) } else { 0.0 }).collect())
+        .collect();
+    let given = |i: usize| given_row(i).to_vec();
+    let scaled = |factor: f64, row: &[f64]| row.iter().map(|x| factor * x).collect::<Vec<f64>>();
+    let sum = |rows: &[Vec<f64>]| (0..COLUMNS).map(|k| rows.iter().map(|row| row[k]).sum()).collect::<Vec<f64>>();
+    let difference = |a: &[f64], b: &[f64]| sum(&[a.to_vec(), scaled(-1.0, b)]);
+    let g = |i: usize| {
+        let mut terms = vec![vec![0.0; COLUMNS]];
+        for j in (0..30).filter(|&j| j != i) {
+            if constraints[j] == Constraint::Fixed {
+                terms.push(scaled(-stiffness[i][j], &given(j)));
+            }
+            if is_soft(i) && constraints[j] != Constraint::Free {
+                let share = if is_soft(j) { share(i.min(j), i.max(j)) } else { share(i, j) };
+                terms.push(scaled(-stiffness[i][j] * share, &difference(&given(i), &given(j))));
+            }
+        }
+        sum(&terms)
+    };
+    let solve = |right: &dyn Fn(usize, usize) -> Vec<f64>| {
+        solved(matrix.clone(), unknowns.iter().enumerate().map(|(k, &i)| right(k, i)).collect())
+    };
+    let x1 = solve(&|_, i| sum(&[scaled(c(i), &given(i)), g(i)]));
+    let x2 = solve(&|k, i| sum(&[scaled(c(i), &x1[k]), g(i)]));
+    let defect =
+        |k: usize, i: usize| sum(&[scaled(1.0 / 2.25, &difference(&given(i), &x2[k])), difference(&x1[k], &x2[k])]);
+    let u = solve(&|k, i| scaled(c(i) * c(i) / masses[i], &defect(k, i)));
+    let w = solve(&|k, i| sum(&[scaled(c(i), &x2[k]), scaled(masses[i], &u[k]), g(i)]));
+    let place = |i: usize| unknowns.binary_search(&i);
+    assert_rows(&filled, |i| place(i).map_or_else(|_| given(i), |k| w[k].clone()), 30, 3e-5);
+    assert!((filled.minimum() - w.concat().into_iter().fold(f64::INFINITY, f64::min)).abs() < 3e-5);
+    assert!(filled.largest_residual() > 0.0 && filled.largest_residual() < 1e-5);
+}
