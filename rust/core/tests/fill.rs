@@ -119,6 +119,26 @@ fn vertices_that_are_one_get_one_row_that_minimises_the_sum_of_their_pulls() {
 }
 
 #[test]
+fn vertices_that_are_one_and_hang_on_nothing_get_the_mean_of_their_rows() {
+    let mut mesh = sheet();
+    mesh.positions.extend([[9.0; 3]; 4]);
+    let mut one: Vec<u32> = (0..34).collect();
+    (one[31], one[32]) = (30, 30);
+    let mut fill = Fill::new(mesh.positions, mesh.triangles, Some(Weld::new(&one))).unwrap();
+    let confidences = [0.3, 1.2, 2.5];
+    let mut constraints = vec![Constraint::Fixed; 34];
+    std::iter::zip(&mut constraints[30..], confidences).for_each(|(c, b)| *c = Constraint::Soft(b));
+    constraints[33] = Constraint::Soft(0.0);
+    assemble_and_factor(&mut fill, &constraints, 0.5);
+    let filled = fill.solve(&push_given, &Progress::default()).unwrap();
+    for column in 0..COLUMNS {
+        let mean = (0..3).map(|k| confidences[k] / 4.0 * given_row(30 + k)[column]).sum::<f64>();
+        assert!((30..33).all(|i| (row_of(&filled, i)[column] - mean).abs() < 1e-12));
+    }
+    assert_eq!(row_of(&filled, 33), [0.0; 3], "no confidence is no row");
+}
+
+#[test]
 fn a_wire_is_linear_between_known_ends() {
     // Two quads with a wire of four vertices from one corner, and a vertex that hangs on nothing.
     let mut positions: Vec<[f32; 3]> = (0..6).map(|i| [(i / 2) as f32, (i % 2) as f32, 0.0]).collect();

@@ -35,7 +35,7 @@ pub fn push_given(i: u32, row: &mut Row) {
 pub fn row_of(filled: &Filled<'_>, i: usize) -> [f64; COLUMNS] {
     let (mut row, mut dense) = (Row::new(), [0.0; COLUMNS]);
     filled.append_row(i, &mut row);
-    assert!(row.is_sorted_by_key(|&(column, _)| column), "row {i}: {row:?}");
+    assert!(row.is_sorted_by(|a, b| a.0 < b.0), "row {i}: {row:?}");
     row.iter().for_each(|&(column, value)| dense[column as usize] += value);
     dense
 }
