@@ -43,7 +43,11 @@ fn free_and_soft_rows_minimise_the_energy() {
     let mut fill = Fill::new(mesh.positions, mesh.triangles, None).unwrap();
     for length in [0.0, 0.8] {
         assemble_and_factor(&mut fill, &constraints, length);
-        let filled = fill.solve(&push_given, &Progress::default()).unwrap();
+        let given_row = |i: u32, row: &mut Row| {
+            assert_ne!(mixed(i as usize), Constraint::Free, "nobody has given row {i}");
+            push_given(i, row);
+        };
+        let filled = fill.solve(&given_row, &Progress::default()).unwrap();
         let expected = minimiser(&energy(&stiffness, &masses, length), &given, &fixed);
         assert_rows(&filled, |i| expected[i].clone(), 30, 1e-7);
         assert!((0..30).all(|i| filled.is_solved(i) == (mixed(i) != Constraint::Fixed)));
@@ -163,6 +167,27 @@ fn a_wire_is_linear_between_known_ends() {
     }
     assert_eq!(row_of(&filled, 10), [0.0, 1.0, 0.0], "there is nothing but the row that it is pulled to");
     assert_eq!((filled.is_solved(10), fill.block_count()), (false, 1));
+}
+
+#[test]
+fn no_confidence_at_all_leaves_nothing_to_solve() {
+    let mesh = sheet();
+    let mut fill = Fill::new(mesh.positions, mesh.triangles, None).unwrap();
+    assemble_and_factor(&mut fill, &[Constraint::Soft(0.0); 30], 0.5);
+    let filled = fill.solve(&push_given, &Progress::default()).unwrap();
+    assert!((0..30).all(|i| !filled.is_solved(i) && row_of(&filled, i) == [0.0; COLUMNS]));
+    assert_eq!((fill.block_count(), filled.minimum()), (0, 0.0));
+}
+
+#[test]
+fn repeated_triangles_are_given_back_but_not_solved_on() {
+    let mut mesh = sheet();
+    let once = mesh.triangles.clone();
+    assert_eq!(Fill::new(mesh.positions.clone(), once.clone(), None).unwrap().mesh().triangles(), once);
+    mesh.triangles.extend([[0, 5, 6], [7, 7, 8]]);
+    let fill = Fill::new(mesh.positions.clone(), mesh.triangles.clone(), None).unwrap();
+    assert_eq!(fill.mesh().triangles(), once);
+    assert_eq!(fill.arrays(), (&mesh.positions[..], &mesh.triangles[..], &[][..]));
 }
 
 #[test]

@@ -11,9 +11,9 @@ mod sheet;
 
 use common::noise;
 use dense::{Matrix, solved, stiffness_and_masses};
-use sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, sheet};
+use sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
 use skinwright_core::Progress;
-use skinwright_core::fill::{Constraint, Fill, Ragged, Screen, screened};
+use skinwright_core::fill::{Constraint, Fill, GivenRows, Patch, Ragged, Row, RowTable, Screen, screened};
 
 #[test]
 fn a_screened_solve_takes_the_four_steps_that_are_written_down() {
@@ -78,4 +78,57 @@ fn a_screened_solve_takes_the_four_steps_that_are_written_down() {
     assert_rows(&filled, |i| place(i).map_or_else(|_| given(i), |k| w[k].clone()), 30, 3e-5);
     assert!((filled.minimum() - w.concat().into_iter().fold(f64::INFINITY, f64::min)).abs() < 3e-5);
     assert!(filled.largest_residual() > 0.0 && filled.largest_residual() < 1e-5);
+}
+
+fn factored(constraints: &[Constraint]) -> Fill {
+    let mesh = sheet();
+    let mut fill = Fill::new(mesh.positions, mesh.triangles, None).unwrap();
+    factor(&mut fill, constraints);
+    fill
+}
+
+fn factor(fill: &mut Fill, constraints: &[Constraint]) {
+    let assembled = fill.assemble_screened(constraints.to_vec(), &Progress::default()).unwrap();
+    fill.factor(assembled, &Progress::default()).unwrap();
+}
+
+fn screen<'a>(rows: &'a RowTable, kept: &'a Ragged<f64>) -> Screen<'a> {
+    Screen { rows, kept, patch: None, with_all_solves: true }
+}
+
+#[test]
+fn one_row_everywhere_is_handed_on_to_the_bit() {
+    let fill = factored(&(0..30).map(mixed).collect::<Vec<_>>());
+    let nothing_kept = Ragged::new(30, |_, _| {});
+    let solve = |given: GivenRows<'_>| {
+        let rows = fill.row_table(given);
+        let filled = fill.solve_screened(given, screen(&rows, &nothing_kept), &Progress::default()).unwrap();
+        ((0..30).map(|i| row_of(&filled, i)).collect::<Vec<_>>(), filled.largest_residual())
+    };
+    let (rows, residual) = solve(&|_, row: &mut Row| row.push((1, 0.3)));
+    assert!(rows.iter().all(|row| *row == [0.0, 0.3, 0.0]) && residual == 0.0);
+    // All are the same but for the first.
+    let first = (0..30).find(|&i| matches!(mixed(i), Constraint::Soft(_))).unwrap();
+    let (rows, _) = solve(&|i, row: &mut Row| row.push((if i as usize == first { 0 } else { 1 }, 1.0)));
+    assert!(rows[first].iter().take(2).all(|&x| x > 1e-3) && rows[0] == [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn a_patch_held_at_what_the_whole_found_is_the_whole() {
+    let whole: Vec<_> = (0..30).map(mixed).collect();
+    let nothing_kept = Ragged::new(30, |_, _| {});
+    let one = |_: u32, row: &mut Row| row.push((1, 0.7));
+    for given in [&push_given as GivenRows<'_>, &one] {
+        let mut fill = factored(&whole);
+        let rows = fill.row_table(given);
+        let filled = fill.solve_screened(given, screen(&rows, &nothing_kept), &Progress::default()).unwrap();
+        let (expected, found): (Vec<_>, _) = ((0..30).map(|i| row_of(&filled, i)).collect(), filled.found());
+        let is_held: Vec<bool> = (0..30).map(|i| i >= 15 && whole[i] != Constraint::Fixed).collect();
+        let constraint = |i: usize| if i < 15 { whole[i] } else { Constraint::Fixed };
+        factor(&mut fill, &(0..30).map(constraint).collect::<Vec<_>>());
+        let patch = Some(Patch { found: &found, is_held: &is_held });
+        let screen = Screen { patch, ..screen(&rows, &nothing_kept) };
+        let filled = fill.solve_screened(given, screen, &Progress::default()).unwrap();
+        assert_rows(&filled, |i| expected[i].to_vec(), 15, 1e-5);
+    }
 }
