@@ -17,10 +17,19 @@ use skinwright_core::fill::{Constraint, Fill, GivenRows, Patch, Ragged, Row, Row
 
 #[test]
 fn a_screened_solve_takes_the_four_steps_that_are_written_down() {
-    let mesh = sheet();
+    // What is negligible must not depend on the unit of length, nor on how lengths compare with edges.
+    for scale in [1.0, 100.0, 0.01] {
+        takes_four_steps(scale, scale);
+    }
+    takes_four_steps(1.0, 8.0);
+}
+
+/// On a sheet of this `size`, with rows that are trusted over one to four times `reach`.
+fn takes_four_steps(size: f64, reach: f64) {
+    let mesh = sheet().mapped(|p| p * size);
     let (stiffness, masses) = stiffness_and_masses(&mesh);
     let constraint = |i: usize| match mixed(i) {
-        Constraint::Soft(x) => Constraint::Soft(screened::confidence(masses[i], 1.0 + 2.0 * x)),
+        Constraint::Soft(x) => Constraint::Soft(screened::confidence(masses[i], reach * (1.0 + 2.0 * x))),
         other => other,
     };
     let constraints: Vec<_> = (0..30).map(constraint).collect();
