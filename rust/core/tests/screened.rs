@@ -10,8 +10,8 @@ mod dense;
 mod sheet;
 
 use common::noise;
-use dense::{Matrix, solved, stiffness_and_masses};
-use sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
+use dense::{Screened, stiffness_and_masses};
+use sheet::{assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
 use skinwright_core::Progress;
 use skinwright_core::fill::{Constraint, Fill, GivenRows, Patch, Ragged, Row, RowTable, Screen, screened};
 
@@ -51,41 +51,17 @@ fn takes_four_steps(size: f64, reach: f64) {
     let screen = Screen { rows: &rows, kept: &kept, patch: None, with_all_solves: true };
     let filled = fill.solve_screened(&push_given, screen, &progress).unwrap();
 
-    let unknowns: Vec<usize> = (0..30).filter(|&i| constraints[i] != Constraint::Fixed).collect();
-    let c = |i: usize| confidence(constraints[i]);
-    let matrix: Matrix = unknowns
-        .iter()
-        .map(|&i| unknowns.iter().map(|&j| stiffness[i][j] + if i == j { c(i) } else { 0.0 }).collect())
-        .collect();
-    let given = |i: usize| given_row(i).to_vec();
-    let scaled = |factor: f64, row: &[f64]| row.iter().map(|x| factor * x).collect::<Vec<f64>>();
-    let sum = |rows: &[Vec<f64>]| (0..COLUMNS).map(|k| rows.iter().map(|row| row[k]).sum()).collect::<Vec<f64>>();
-    let difference = |a: &[f64], b: &[f64]| sum(&[a.to_vec(), scaled(-1.0, b)]);
-    let g = |i: usize| {
-        let mut terms = vec![vec![0.0; COLUMNS]];
-        for j in (0..30).filter(|&j| j != i) {
-            if constraints[j] == Constraint::Fixed {
-                terms.push(scaled(-stiffness[i][j], &given(j)));
-            }
-            if is_soft(i) && constraints[j] != Constraint::Free {
-                let share = if is_soft(j) { share(i.min(j), i.max(j)) } else { share(i, j) };
-                terms.push(scaled(-stiffness[i][j] * share, &difference(&given(i), &given(j))));
-            }
-        }
-        sum(&terms)
+    let problem = Screened {
+        stiffness,
+        confidence: constraints.iter().map(|&c| confidence(c)).collect(),
+        is_fixed: constraints.iter().map(|&c| c == Constraint::Fixed).collect(),
+        rows: (0..30).map(|i| constraints[i].is_known().then(|| given_row(i).to_vec())).collect(),
+        masses,
     };
-    let solve = |right: &dyn Fn(usize, usize) -> Vec<f64>| {
-        solved(matrix.clone(), unknowns.iter().enumerate().map(|(k, &i)| right(k, i)).collect())
-    };
-    let x1 = solve(&|_, i| sum(&[scaled(c(i), &given(i)), g(i)]));
-    let x2 = solve(&|k, i| sum(&[scaled(c(i), &x1[k]), g(i)]));
-    let defect =
-        |k: usize, i: usize| sum(&[scaled(1.0 / 2.25, &difference(&given(i), &x2[k])), difference(&x1[k], &x2[k])]);
-    let u = solve(&|k, i| scaled(c(i) * c(i) / masses[i], &defect(k, i)));
-    let w = solve(&|k, i| sum(&[scaled(c(i), &x2[k]), scaled(masses[i], &u[k]), g(i)]));
-    let place = |i: usize| unknowns.binary_search(&i);
-    assert_rows(&filled, |i| place(i).map_or_else(|_| given(i), |k| w[k].clone()), 30, 3e-5);
-    assert!((filled.minimum() - w.concat().into_iter().fold(f64::INFINITY, f64::min)).abs() < 3e-5);
+    let expected = problem.solved(|i, j| if is_soft(j) { share(i.min(j), i.max(j)) } else { share(i, j) });
+    assert_rows(&filled, |i| expected[i].clone(), 30, 3e-5);
+    let solved = (0..30).filter(|&i| filled.is_solved(i)).flat_map(|i| expected[i].clone());
+    assert!((filled.minimum() - solved.fold(f64::INFINITY, f64::min)).abs() < 3e-5);
     assert!(filled.largest_residual() > 0.0 && filled.largest_residual() < 1e-5);
 }
 

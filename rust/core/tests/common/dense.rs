@@ -64,3 +64,59 @@ pub fn solved(mut matrix: Matrix, mut right: Matrix) -> Matrix {
     }
     (0..n).map(|k| right[k].iter().map(|x| x / matrix[k][k]).collect()).collect()
 }
+
+/// Rows pulled towards given ones over lengths of their own, by four solves: what `fill::screened` documents.
+pub struct Screened {
+    pub stiffness: Matrix,
+    pub masses: Vec<f64>,
+    /// C, 0 where nothing is given or the row is fixed.
+    pub confidence: Vec<f64>,
+    pub is_fixed: Vec<bool>,
+    /// The given rows.
+    pub rows: Vec<Option<Vec<f64>>>,
+}
+
+/// a of the documentation, squared.
+const REACH_SQUARED: f64 = 2.25;
+
+impl Screened {
+    /// The rows of all vertices; `kept(i, j)` is the share of the change from soft vertex i to j that stays.
+    pub fn solved(&self, kept: impl Fn(usize, usize) -> f64) -> Matrix {
+        let n = self.masses.len();
+        let unknowns: Vec<usize> = (0..n).filter(|&i| !self.is_fixed[i]).collect();
+        let c = |i: usize| self.confidence[i];
+        let entry = |i: usize, j: usize| self.stiffness[i][j] + if i == j { c(i) } else { 0.0 };
+        let matrix: Matrix = unknowns.iter().map(|&i| unknowns.iter().map(|&j| entry(i, j)).collect()).collect();
+        let g: Matrix = (0..n).map(|i| self.brought(i, &kept)).collect();
+        let zero = vec![0.0; g[0].len()];
+        let given = |i: usize| self.rows[i].as_ref().unwrap_or(&zero);
+        let solve = |right: &dyn Fn(usize, usize, usize) -> f64| {
+            let row = |(k, &i): (usize, &usize)| (0..zero.len()).map(|column| right(k, i, column)).collect();
+            solved(matrix.clone(), unknowns.iter().enumerate().map(row).collect())
+        };
+        let x1 = solve(&|_, i, column| c(i) * given(i)[column] + g[i][column]);
+        let x2 = solve(&|k, i, column| c(i) * x1[k][column] + g[i][column]);
+        let defect = |k: usize, i: usize, column: usize| {
+            (given(i)[column] - x2[k][column]) / REACH_SQUARED + x1[k][column] - x2[k][column]
+        };
+        let u = solve(&|k, i, column| c(i) * c(i) / self.masses[i] * defect(k, i, column));
+        let w = solve(&|k, i, column| c(i) * x2[k][column] + self.masses[i] * u[k][column] + g[i][column]);
+        let row = |i: usize| unknowns.binary_search(&i).map_or_else(|_| given(i).clone(), |k| w[k].clone());
+        (0..n).map(row).collect()
+    }
+
+    /// g of vertex i: what fixed rows and kept changes bring.
+    fn brought(&self, i: usize, kept: &impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let mut sum = vec![0.0; self.rows.iter().flatten().next().map_or(0, Vec::len)];
+        for (j, row) in self.rows.iter().enumerate().filter(|&(j, _)| j != i) {
+            let (Some(row), coupling) = (row, -self.stiffness[i][j]) else { continue };
+            for (column, sum) in sum.iter_mut().enumerate() {
+                *sum += if self.is_fixed[j] { coupling * row[column] } else { 0.0 };
+                if let Some(own) = self.rows[i].as_ref().filter(|_| self.confidence[i] > 0.0) {
+                    *sum += coupling * kept(i, j) * (own[column] - row[column]);
+                }
+            }
+        }
+        sum
+    }
+}
