@@ -2,6 +2,7 @@
 
 #[allow(dead_code)]
 mod common;
+#[allow(dead_code)]
 #[path = "common/dense.rs"]
 mod dense;
 #[path = "common/sheet.rs"]
@@ -167,6 +168,31 @@ fn a_wire_is_linear_between_known_ends() {
     }
     assert_eq!(row_of(&filled, 10), [0.0, 1.0, 0.0], "there is nothing but the row that it is pulled to");
     assert_eq!((filled.is_solved(10), fill.block_count()), (false, 1));
+}
+
+#[test]
+fn a_hub_of_many_spokes_couples_all_of_them() {
+    let spokes = 150;
+    let position = |k: usize| {
+        let (ring, angle) = (1 + k / spokes, (k % spokes) as f64 / spokes as f64 * std::f64::consts::TAU);
+        [0, 1, 2]
+            .map(|axis| (ring as f64 * [angle.cos(), angle.sin(), 0.1][axis] * (1.0 + 0.1 * noise(k as u64, 5))) as f32)
+    };
+    let n = spokes as u32;
+    let spoke = |k: u32| {
+        let (a, b) = (1 + k, 1 + (k + 1) % n);
+        [[0, a, b], [a, a + n, b + n], [a, b + n, b]]
+    };
+    let positions: Vec<[f32; 3]> = std::iter::once([0.0; 3]).chain((0..2 * spokes).map(position)).collect();
+    let mesh = Fixture::new("hub", positions, (0..n).flat_map(spoke).collect());
+    let (stiffness, masses) = stiffness_and_masses(&mesh);
+    let fixed: Vec<_> = (1 + spokes..1 + 2 * spokes).map(|i| (i, given_row(i))).collect();
+    let expected = minimiser(&energy(&stiffness, &masses, 0.4), &[], &fixed);
+    let mut fill = Fill::new(mesh.positions, mesh.triangles, None).unwrap();
+    let constraint = |i: usize| if i <= spokes { Constraint::Free } else { Constraint::Fixed };
+    assemble_and_factor(&mut fill, &(0..1 + 2 * spokes).map(constraint).collect::<Vec<_>>(), 0.4);
+    let filled = fill.solve(&push_given, &Progress::default()).unwrap();
+    assert_rows(&filled, |i| expected[i].clone(), 1 + spokes, 1e-6);
 }
 
 #[test]
