@@ -16,9 +16,9 @@ fn body() -> Source {
     source(&[wall(-20.0, 1, 8.0, 16)], 2, |_, [_, y, _]| (vec![0, 1], vec![0.5 - y / 8.0, 0.5 + y / 8.0]))
 }
 
-/// `parts` on a garment at x = 0, 4 wide, of `n` x `n` quads.
-fn hung(n: usize, parts: &[Fixture]) -> Transfer {
-    let whole = parts.iter().cloned().fold(wall(0.0, 1, 4.0, n), Fixture::joined);
+/// `parts` on a garment at x = `at`, 4 wide, of `n` x `n` quads.
+fn hung(at: f64, n: usize, parts: &[Fixture]) -> Transfer {
+    let whole = parts.iter().cloned().fold(wall(at, 1, 4.0, n), Fixture::joined);
     let is_garment = |i: usize| i < (n + 1) * (n + 1);
     let force = |i| if is_garment(i) { MaskValue::ForceMatch } else { MaskValue::Automatic };
     let mask: Vec<MaskValue> = (0..whole.positions.len()).map(force).collect();
@@ -28,9 +28,9 @@ fn hung(n: usize, parts: &[Fixture]) -> Transfer {
 }
 
 /// Each part's y on the garment: that of the point it hangs on, or of the part it hangs on.
-fn by_prim(parts: &[Fixture]) -> Vec<f64> {
+fn by_prim(at: f64, parts: &[Fixture]) -> Vec<f64> {
     let vertices = |k: usize| parts[k].positions.iter().map(|&p| Vec3::from(p).as_dvec3());
-    let on_garment = |p: DVec3| p.distance(DVec3::new(0.0, p.y.clamp(-2.0, 2.0), p.z.clamp(-2.0, 2.0)));
+    let on_garment = |p: DVec3| p.distance(DVec3::new(at, p.y.clamp(-2.0, 2.0), p.z.clamp(-2.0, 2.0)));
     let to_garment = |k: usize| vertices(k).map(|p| (on_garment(p), p.y.clamp(-2.0, 2.0))).min_by(by_gap).unwrap();
     let mut best: Vec<(f64, f64)> = (0..parts.len()).map(to_garment).collect();
     let mut is_hung = vec![false; parts.len()];
@@ -84,18 +84,31 @@ fn part(seed: u64, k: u64) -> Fixture {
 fn parts_hang_where_prims_algorithm_hangs_them() {
     // Few parts look at some of a fine garment's triangles only; many wait in a tree.
     for (seed, count, n) in [(1, 1, 60), (2, 3, 60), (3, 5, 10), (4, 40, 4), (5, 90, 4), (6, 150, 4)] {
-        let parts: Vec<Fixture> = (0..count).map(|k| part(seed, k)).collect();
-        let (expected, result) = (by_prim(&parts), hung(n, &parts));
-        let mut first = (n + 1) * (n + 1);
-        for (k, (part, y)) in std::iter::zip(&parts, expected).enumerate() {
-            let row = [0.5 - y as f32 / 8.0, 0.5 + y as f32 / 8.0];
-            let found = dense(&result.weights, first);
-            assert!(is_row(&result.weights, first, &row), "seed {seed}, part {k}: {found:?} is not {row:?}");
-            assert!((first..first + part.positions.len()).all(|i| dense(&result.weights, i) == found), "one row");
-            first += part.positions.len();
-        }
-        assert_eq!(result.report.unmatched_islands.len(), parts.len());
+        agrees_with_prim(&(0..count).map(|k| part(seed, k)).collect::<Vec<_>>(), 0.0, n);
     }
+    // Two groups on both sides of the origin: one close to the garment, the other nearer to that one than to the garment.
+    for seed in 7..37 {
+        let group = |k: u64, p: DVec3| {
+            let aside = DVec3::new(1.5 + 0.1 * p.x, 0.3 + 0.3 * p.y, 0.3 + 0.3 * p.z);
+            if (k + seed).is_multiple_of(2) { aside } else { -aside }
+        };
+        let parts: Vec<Fixture> = (0..12).map(|k| part(seed, k).mapped(|p| group(k, p))).collect();
+        agrees_with_prim(&parts, -1.8, 4);
+        agrees_with_prim(&parts, 1.8, 4);
+    }
+}
+
+fn agrees_with_prim(parts: &[Fixture], at: f64, n: usize) {
+    let (expected, result) = (by_prim(at, parts), hung(at, n, parts));
+    let mut first = (n + 1) * (n + 1);
+    for (k, (part, y)) in std::iter::zip(parts, expected).enumerate() {
+        let row = [0.5 - y as f32 / 8.0, 0.5 + y as f32 / 8.0];
+        let found = dense(&result.weights, first);
+        assert!(is_row(&result.weights, first, &row), "{at}, {n}: part {k}: {found:?} is not {row:?}");
+        assert!((first..first + part.positions.len()).all(|i| dense(&result.weights, i) == found), "one row");
+        first += part.positions.len();
+    }
+    assert_eq!(result.report.unmatched_islands.len(), parts.len());
 }
 
 #[test]
@@ -105,7 +118,7 @@ fn of_equal_gaps_the_garment_counts() {
     let first = triangle([[0.5, 0.5, 0.0], [0.25, 1.0, 0.0], [0.25, 1.0, 0.5]]);
     let second = triangle([[0.5, 0.0, 0.0], [0.75, -0.25, 0.0], [0.75, -0.25, 0.25]]);
     for parts in [[first.clone(), second.clone()], [second, first]] {
-        let (result, is_swapped) = (hung(4, &parts), parts[0].positions[0][1] == 0.0);
+        let (result, is_swapped) = (hung(0.0, 4, &parts), parts[0].positions[0][1] == 0.0);
         let [first, second] = if is_swapped { [28, 25] } else { [25, 28] };
         assert!(is_row(&result.weights, first, &[0.375, 0.625]), "{:?}", dense(&result.weights, first));
         assert!(is_row(&result.weights, second, &[0.5, 0.5]), "{:?}", dense(&result.weights, second));
