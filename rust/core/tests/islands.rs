@@ -105,6 +105,27 @@ fn where_nothing_matches_parts_hang_on_the_body_and_on_each_other() {
     assert_eq!((policies, result.report.matched), (vec![IslandPolicy::Bridge; 3], 0));
 }
 
+#[test]
+fn a_part_over_skin_without_weights_hangs_while_others_take_their_own() {
+    let bare = source(&[wall(0.0, 1, 4.0, 16)], 2, |_, [_, y, _]| {
+        let t = 0.2 * y + 0.5;
+        if y > 1.1 { (vec![], vec![]) } else { (vec![0, 1], vec![1.0 - t, t]) }
+    });
+    // The garment on the wall ends at y = 0.25; the other two match nothing.
+    let parts =
+        wall(0.005, 1, 0.5, 2).joined(triangle([0.1; 3], [0.2, 0.2], -1.0)).joined(triangle([0.1; 3], [0.2, 0.2], 1.4));
+    for policy in [IslandPolicy::Rigid, IslandPolicy::Nearest] {
+        let result = transfer(&bare, &parts, &unmatched(policy));
+        let is_at = |i: usize, t: f32| is_row(&result.weights, i, &[1.0 - t, t]);
+        let own = |i: usize| 0.2 * parts.positions[i][1] + 0.5;
+        let mean = (own(9) + own(10) + own(11)) / 3.0;
+        assert!((9..12).all(|i| is_at(i, if policy == IslandPolicy::Rigid { mean } else { own(i) })), "{policy:?}");
+        assert!((12..15).all(|i| is_at(i, 0.2 * 0.25 + 0.5)), "{policy:?}: {:?}", dense(&result.weights, 12));
+        let policies: Vec<_> = result.report.unmatched_islands.iter().map(|island| island.policy).collect();
+        assert_eq!(policies, [policy, IslandPolicy::Bridge]);
+    }
+}
+
 /// A part half a unit before the wall that looks the other way, and a garment 0.3 before it that ends `aside` of the part:
 /// whether the part takes the row of the garment's edge, or else that of the wall below it.
 fn hangs_on_the_garment(aside: f64, max_distance: f64) -> bool {
