@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3, Vec3};
 use skinwright_core::transfer::{
     Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, Transfer, transfer_weights,
 };
-use walls::{dense, relief, source, target, wall};
+use walls::{dense, is_row, parts_with_bones, relief, source, target, wall};
 
 const SOFTNESS: f64 = 0.7;
 
@@ -138,4 +138,16 @@ fn a_plate_over_a_valley_gets_the_rows_of_the_four_solves() {
             assert!((f64::from(found[1]) - expected[1]).abs() < 1e-4, "{slope}, {i}: {found:?} is not {expected:?}");
         }
     }
+}
+
+#[test]
+fn a_card_in_the_middle_takes_both_sides_by_area() {
+    // Each vertex is as near to the inside of a triangle of one wall as to that of a larger one of the other.
+    let sides = parts_with_bones(&[wall(-1.0, 1, 4.0, 4), wall(1.0, -1, 4.0, 3)]);
+    let corners = [[0.0, 0.1, 0.3], [0.0, 0.2, 0.45], [0.0, -0.3, 0.4]];
+    let card = Fixture::new("card", corners.to_vec(), vec![[0, 1, 2], [0, 2, 1]]);
+    let result = transfer(&sides, &card, None);
+    let areas = [0.5, 8.0 / 9.0];
+    let expected = areas.map(|area| area / (areas[0] + areas[1]));
+    assert!((0..3).all(|i| is_row(&result.weights, i, &expected)), "{:?}", dense(&result.weights, 0));
 }

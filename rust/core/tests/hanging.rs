@@ -124,3 +124,13 @@ fn of_equal_gaps_the_garment_counts() {
         assert!(is_row(&result.weights, second, &[0.5, 0.5]), "{:?}", dense(&result.weights, second));
     }
 }
+
+#[test]
+fn a_part_that_touches_the_garment_hangs_there() {
+    let corners = vec![[0.0, 0.71, 0.3], [0.01, 0.71, 0.3], [0.01, 0.72, 0.3]];
+    let touching = Fixture::new("triangle", corners, vec![[0, 1, 2]]);
+    let first = 61 * 61;
+    let result = hung(0.0, 60, &[touching]);
+    let t = 0.71 / 8.0;
+    assert!((first..first + 3).all(|i| is_row(&result.weights, i, &[0.5 - t, 0.5 + t])));
+}
