@@ -9,7 +9,7 @@ mod walls;
 use common::{Fixture, noise};
 use glam::{DVec3, Vec3};
 use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, Settings, Source, Transfer, transfer_weights};
-use walls::{dense, is_row, relief, source, target, wall};
+use walls::{dense, distance_to_triangle, is_row, relief, source, target, wall};
 
 /// A body far behind everything, so that parts hang on the garment; its weights are linear in y and tell where.
 fn body() -> Source {
@@ -55,18 +55,6 @@ fn by_gap(a: &(f64, f64), b: &(f64, f64)) -> std::cmp::Ordering {
 fn distance_to(p: DVec3, part: &Fixture) -> f64 {
     let corners = |t: &[u32; 3]| t.map(|i| Vec3::from(part.positions[i as usize]).as_dvec3());
     part.triangles.iter().map(|t| distance_to_triangle(p, corners(t))).fold(f64::INFINITY, f64::min)
-}
-
-fn distance_to_triangle(p: DVec3, corners: [DVec3; 3]) -> f64 {
-    let [a, b, c] = corners;
-    let normal = (b - a).cross(c - a).normalize();
-    let sides = [(a, b), (b, c), (c, a)];
-    if sides.iter().all(|(s, e)| (*e - *s).cross(p - *s).dot(normal) >= 0.0) {
-        return (p - a).dot(normal).abs();
-    }
-    let to_side =
-        |(s, e): (DVec3, DVec3)| p.distance(s.lerp(e, ((p - s).dot(e - s) / e.distance_squared(s)).clamp(0.0, 1.0)));
-    sides.map(to_side).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// A part somewhere before the garment: a triangle, or every third time a curved plate of 32 triangles.

@@ -1,6 +1,7 @@
 //! Bodies made of flat walls, on which closest points and normals are known without a computer.
 
 use super::common::{Fixture, Row};
+use glam::DVec3;
 use skinwright_core::Weights;
 use skinwright_core::transfer::{Source, TargetMesh};
 
@@ -58,4 +59,17 @@ pub fn dense(weights: &Weights, i: usize) -> Vec<f32> {
 /// Whether row `i` is this one within 1e-5.
 pub fn is_row(weights: &Weights, i: usize, expected: &[f32]) -> bool {
     std::iter::zip(dense(weights, i), expected).all(|(found, expected)| (found - expected).abs() < 1e-5)
+}
+
+/// Distance of a point to a triangle, by its plane or else its sides.
+pub fn distance_to_triangle(p: DVec3, corners: [DVec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a).normalize();
+    let sides = [(a, b), (b, c), (c, a)];
+    if sides.iter().all(|(s, e)| (*e - *s).cross(p - *s).dot(normal) >= 0.0) {
+        return (p - a).dot(normal).abs();
+    }
+    let to_side =
+        |(s, e): (DVec3, DVec3)| p.distance(s.lerp(e, ((p - s).dot(e - s) / e.distance_squared(s)).clamp(0.0, 1.0)));
+    sides.map(to_side).into_iter().fold(f64::INFINITY, f64::min)
 }
