@@ -9,7 +9,7 @@ mod walls;
 use common::Fixture;
 use glam::{DVec3, Vec3};
 use skinwright_core::transfer::{Length, MatchMethod, Settings, transfer_weights};
-use walls::{distance_to_triangle, parts_with_bones, relief, target, wall};
+use walls::{dense, distance_to_triangle, parts_with_bones, relief, target, wall};
 
 /// A triangle of the body as one vertex sees it.
 struct Found {
@@ -100,5 +100,32 @@ fn choices_are_those_of_a_search_through_all_triangles() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn a_lining_stays_though_some_of_what_surrounds_it_is_none() {
+    // The left thigh lies behind the middle and one side of it, where the sheet is close to it; on the other three sides the
+    // sheet matches the right one flipped.
+    let left = wall(-0.1, 1, 0.8, 20).mapped(|p| DVec3::new(p.x, if p.y > 0.0 { 4.0 * p.y } else { p.y }, p.z));
+    let is_side = |y: f64, z: f64| y > 0.45 && z.abs() < 0.45;
+    let is_middle = |y: f64, z: f64| y.abs().max(z.abs()) < 0.45;
+    let at = |y, z| {
+        if is_middle(y, z) {
+            0.02
+        } else if is_side(y, z) {
+            -0.05
+        } else {
+            0.05
+        }
+    };
+    let sheet = relief(at, 1, 3.0, 15);
+    let source = parts_with_bones(&[left, wall(0.1, -1, 4.0, 20)]);
+    let max_distance = Length::Absolute(0.3);
+    for method in MatchMethod::ALL {
+        let settings = Settings { method, max_distance, ..Settings::default() };
+        let result = transfer_weights(&source, target(&sheet), None, &settings).unwrap();
+        let (middle, side) = (dense(&result.weights, 7 * 16 + 7), dense(&result.weights, 12 * 16 + 7));
+        assert!(middle[1] > 0.7 && side[0] > 0.7, "{method:?}: {middle:?} {side:?}");
     }
 }
