@@ -15,6 +15,7 @@ mod figures;
 mod finish;
 mod frame;
 mod harm;
+mod holes;
 mod joints;
 mod lattice;
 mod limiting;
@@ -224,8 +225,9 @@ impl Refiner {
     /// By how much the volume of the skin at `places` (welded) differs from rest, as a share.
     fn lost(&self, places: &[Vec3]) -> f64 {
         let surface = &self.prepared.surface;
-        let now = surface.volume(|i| places[i as usize].as_dvec3());
-        (now / surface.volume(|i| surface.rest[i as usize]) - 1.0).abs()
+        let now: f64 = surface.volumes(|i| places[i as usize].as_dvec3()).iter().sum();
+        let at_rest: f64 = surface.volumes(|i| surface.rest[i as usize]).iter().sum();
+        (now / at_rest - 1.0).abs()
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.
