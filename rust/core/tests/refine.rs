@@ -76,6 +76,28 @@ fn a_bent_limb_keeps_its_volume_and_leaves_itself_alone() {
     }
 }
 
+#[test]
+fn a_rig_that_is_scaled_as_a_whole_scales_the_answer() {
+    let limb = limb(28, 44);
+    let refiner = refiner(&limb, Settings { cell: Some(0.05), ..Settings::default() }).unwrap();
+    let pose = turned(DVec3::Z, 110.0);
+    for quality in [Quality::Live, Quality::Bake] {
+        let alone = refiner.solve(&pose, quality).unwrap();
+        for size in [0.01, 0.5, 2.0] {
+            let scaled =
+                DAffine3::from_scale(DVec3::splat(size)) * DAffine3::from_translation(DVec3::new(0.3, 0.2, 0.1));
+            let pose: Vec<DAffine3> = pose.iter().map(|&bone| scaled * bone).collect();
+            let answer = refiner.solve(&pose, quality).unwrap();
+            let expected = alone.iter().map(|&p| scaled.transform_point3(Vec3::from(p).as_dvec3()));
+            let off = std::iter::zip(&answer, expected).map(|(&p, q)| Vec3::from(p).as_dvec3().distance(q));
+            let off = off.fold(0.0, f64::max) / size;
+            assert!(off < 5e-3, "{quality:?}, size {size}: off by {off}");
+            let (_, joints) = refiner.measure(&pose, &answer).unwrap();
+            assert!(joints[0].volume.is_some_and(|change| change.abs() < 0.01), "{joints:?}");
+        }
+    }
+}
+
 /// The limb on a chain of bones that are shorter than it is thick, so that none of their joints is a limb's, each of them
 /// turned by `degrees` against the one before. The first `left_out` triangles are not there for the solver. Returns the change
 /// of the volume within all triangles.
@@ -261,6 +283,12 @@ fn bad_input_is_a_sentence() {
     assert!(matches!(refiner(&flat, Settings::default()), Err(Error::NothingInside)));
     let point = Limb { positions: vec![[0.0; 3]; good.positions.len()], ..limb(12, 12) };
     assert!(matches!(refiner(&point, Settings::default()), Err(Error::NothingInside)));
+    for size in [0.9, 1.0, 1.1, 3.0] {
+        let positions = good.positions.iter().map(|p| p.map(|x| size * x)).collect();
+        let triangles = good.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        let inside_out = Limb { positions, triangles, ..limb(12, 12) };
+        assert!(matches!(refiner(&inside_out, Settings::default()), Err(Error::NothingInside)), "size {size}");
+    }
     let mut broken = limb(12, 12);
     broken.positions[3][1] = f32::NAN;
     assert!(matches!(refiner(&broken, Settings::default()), Err(Error::PositionNotFinite { vertex: 3, .. })));

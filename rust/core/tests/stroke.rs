@@ -132,3 +132,19 @@ fn what_cannot_be_solved_near_is_solved_as_a_whole() {
     let paper = prepared.solve_near(Some(&mask), &Settings::default(), &Progress::default()).unwrap();
     assert_eq!(paper.report.solved_near, None);
 }
+
+#[test]
+fn a_solve_is_kept_of_large_meshes_with_confidences_and_without_smoothing() {
+    let keeps = |target: &Fixture, settings: Settings| {
+        let mut prepared = prepared(target, &settings);
+        assert!(!prepared.has_base());
+        prepared.solve(None, &settings, &Progress::default()).unwrap();
+        assert!(!prepared.has_base(), "nobody has asked for strokes");
+        prepared.solve_near(None, &settings, &Progress::default()).unwrap();
+        prepared.has_base()
+    };
+    assert!(keeps(&large(), confidence()));
+    assert!(!keeps(&common::skirt(), confidence()), "it is solved as fast as a whole");
+    assert!(!keeps(&large(), Settings::default()));
+    assert!(!keeps(&large(), Settings { smoothing_iterations: 1, ..confidence() }));
+}

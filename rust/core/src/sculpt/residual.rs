@@ -65,12 +65,16 @@ pub(super) fn reachability(before: &[DVec3], after: &[DVec3]) -> f64 {
     if before > 0.0 { 1.0 - norm(after) / before } else { 1.0 }
 }
 
-/// The inverse, or (M'M + damping)^-1 M' where M is nearly singular against its own size.
+/// The inverse, or (M'M + damping)^-1 M' where M is nearly singular against its own size; zero where nothing of M is left, as
+/// of a bone that is scaled to zero.
 fn damped_inverse(m: DMat3) -> DMat3 {
     let size = (m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared()) / 3.0;
     if m.determinant().abs() > 1e-3 * size.powf(1.5) {
         return m.inverse();
     }
-    let damped = m.transpose() * m + DMat3::from_diagonal(DVec3::splat(1e-2 * size.max(f64::MIN_POSITIVE)));
+    if size == 0.0 {
+        return DMat3::ZERO;
+    }
+    let damped = m.transpose() * m + DMat3::from_diagonal(DVec3::splat(1e-2 * size));
     damped.inverse() * m.transpose()
 }

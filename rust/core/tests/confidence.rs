@@ -1,0 +1,153 @@
+//! The method of confidences against its formulas, over bodies where closest points are known in closed form.
+
+#[allow(dead_code)]
+mod common;
+#[allow(dead_code)]
+#[path = "common/dense.rs"]
+mod dense;
+#[allow(dead_code)]
+#[path = "common/walls.rs"]
+mod walls;
+
+use common::Fixture;
+use dense::{Screened, stiffness_and_masses};
+use glam::{DVec2, DVec3, Vec3};
+use skinwright_core::transfer::{
+    Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, Transfer, transfer_weights,
+};
+use walls::{dense, is_row, parts_with_bones, relief, source, target, wall};
+
+const SOFTNESS: f64 = 0.7;
+
+fn transfer(source: &Source, fixture: &Fixture, mask: Option<&[MaskValue]>) -> Transfer {
+    let settings = Settings {
+        method: MatchMethod::Confidence,
+        softness: SOFTNESS,
+        small_islands: SmallIslands::Solved,
+        max_distance: Length::Absolute(2.0),
+        ..Settings::default()
+    };
+    transfer_weights(source, target(fixture), mask, &settings).unwrap()
+}
+
+/// The length over which a row is trusted, from gap, cosine between the normals, and the body's size.
+fn length(gap: f64, cosine: f64, size: f64) -> f64 {
+    let tangent_squared = 1.0 / cosine.powi(2) - 1.0;
+    SOFTNESS * gap * (0.93 + 2.8 * tangent_squared) + (1e-3 * size).min(gap / 2.0) + 1e-6 * size
+}
+
+/// How far such a row is trusted.
+fn trusted(gap: f64, cosine: f64, size: f64) -> f64 {
+    1.0 / (1.0 + (length(gap, cosine, size) / (0.02 * size)).powi(2))
+}
+
+#[test]
+fn confidence_falls_with_gap_and_tilt() {
+    // 4.2 times the root mean square distance from the centre of a square of side 4.
+    let size = 4.2 * 4.0 / 6f64.sqrt();
+    let flat = source(&[wall(0.0, 1, 4.0, 16)], 2, |_, _| (vec![0], vec![1.0]));
+    assert!((flat.size() - size).abs() < 1e-5);
+    for (gap, slope) in [(0.01, 0.0), (0.2, 0.0), (0.05, 0.5), (0.1, 1.0), (0.2, 4.0), (0.001, 60.0)] {
+        let plate = relief(|y, _| gap + slope * (y + 0.02), 1, 0.04, 2);
+        let result = transfer(&flat, &plate, None);
+        for (i, p) in plate.positions.iter().enumerate() {
+            let cosine = (1.0 / f64::hypot(1.0, slope)).max(0.05);
+            let expected = trusted(p[0].into(), cosine, size);
+            assert!((f64::from(result.confidence[i]) - expected).abs() < 2e-4, "{gap} {slope}: {i}");
+            assert_eq!(result.matched[i], result.confidence[i] >= 0.5);
+        }
+    }
+}
+
+/// The nearest point of the valley x = |y| / 2, and its gap.
+fn on_valley(p: DVec3) -> (DVec3, f64) {
+    let nearest = [-1.0, 1.0].map(|side| {
+        let along = DVec2::new(0.5, side).normalize();
+        let foot = along * along.dot(p.truncate()).max(0.0);
+        (DVec3::new(foot.x, foot.y, p.z), foot.distance(p.truncate()))
+    });
+    if nearest[0].1 < nearest[1].1 { nearest[0] } else { nearest[1] }
+}
+
+/// The body's normal there: at the vertices of the crease it points along x, a quarter away it is the plane's.
+fn normal_of_valley(p: DVec3) -> DVec3 {
+    let plane = DVec3::new(1.0, -0.5 * p.y.signum(), 0.0).normalize();
+    DVec3::X.lerp(plane, (p.y.abs() / 0.25).min(1.0)).normalize()
+}
+
+/// What is known of a vertex of the plate.
+#[derive(Clone, Copy)]
+struct Place {
+    vertex: DVec3,
+    point: DVec3,
+    gap: f64,
+    cosine: f64,
+    weight: f64,
+}
+
+/// Share of the change of weight along an edge that is kept.
+fn kept(here: Place, there: Place, size: f64) -> f64 {
+    let length = here.vertex.distance(there.vertex);
+    let stretch = here.point.distance(there.point) / length;
+    let gap = here.gap.max(there.gap) / (0.05 * size);
+    let cosine = here.cosine.min(there.cosine);
+    let steepness = (here.weight - there.weight).abs() * size / length;
+    let trust = 0.85 * cosine.powi(4) / ((1.0 + ((stretch - 1.0).max(0.0) / 0.5).powi(2)) * (1.0 + gap.powi(4)));
+    trust / (1.0 + (steepness / 25.0).powi(2))
+}
+
+/// A plate over a valley, whose neighbours across the valley have points that lie farther apart than they do.
+#[test]
+fn a_plate_over_a_valley_gets_the_rows_of_the_four_solves() {
+    for slope in [0.2, 0.6] {
+        let weight = |p: DVec3| (slope * p.y + 0.5).clamp(0.0, 1.0);
+        let valley = relief(|y, _| y.abs() / 2.0, 1, 4.0, 16);
+        let source = source(&[valley], 2, |_, p| {
+            let t = weight(Vec3::from(p).as_dvec3()) as f32;
+            (vec![0, 1], vec![1.0 - t, t])
+        });
+        // Means of x^2, y^2 and z^2 about the centroid.
+        let size = 4.2 * (1.0 / 12.0 + 4.0 / 3.0 + 4.0 / 3.0f64).sqrt();
+        assert!((source.size() - size).abs() < 1e-5);
+        let plate = relief(|_, z| 0.25 + 0.1 * z, 1, 1.2, 5);
+        let normal = DVec3::new(1.0, 0.0, -0.1).normalize();
+        let place = |p: &[f32; 3]| {
+            let vertex = Vec3::from(*p).as_dvec3();
+            let (point, gap) = on_valley(vertex);
+            Place { vertex, point, gap, cosine: normal.dot(normal_of_valley(point)), weight: weight(point) }
+        };
+        let places: Vec<Place> = plate.positions.iter().map(place).collect();
+        let (stiffness, masses) = stiffness_and_masses(&plate);
+        let lengths: Vec<f64> = places.iter().map(|place| length(place.gap, place.cosine, size)).collect();
+        // One is forced, and a row that is trusted over less than a quarter of the shortest edge is held.
+        let is_fixed: Vec<bool> = std::iter::zip(0.., &lengths).map(|(i, &h)| i == 14 || h < 0.25 * 0.24).collect();
+        let confidence = |i: usize| 1.5 * masses[i] / lengths[i].powi(2);
+        let problem = Screened {
+            confidence: (0..places.len()).map(|i| if is_fixed[i] { 0.0 } else { confidence(i) }).collect(),
+            rows: places.iter().map(|place| Some(vec![1.0 - place.weight, place.weight])).collect(),
+            stiffness,
+            masses: masses.clone(),
+            is_fixed: is_fixed.clone(),
+        };
+        let expected = problem.solved(|i, j| kept(places[i], places[j], size));
+        let mut mask = vec![MaskValue::Automatic; places.len()];
+        mask[14] = MaskValue::ForceMatch;
+        let result = transfer(&source, &plate, Some(&mask));
+        for (i, expected) in expected.iter().enumerate() {
+            let found = dense(&result.weights, i);
+            assert!((f64::from(found[1]) - expected[1]).abs() < 1e-4, "{slope}, {i}: {found:?} is not {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn a_card_in_the_middle_takes_both_sides_by_area() {
+    // Each vertex is as near to the inside of a triangle of one wall as to that of a larger one of the other.
+    let sides = parts_with_bones(&[wall(-1.0, 1, 4.0, 4), wall(1.0, -1, 4.0, 3)]);
+    let corners = [[0.0, 0.1, 0.3], [0.0, 0.2, 0.45], [0.0, -0.3, 0.4]];
+    let card = Fixture::new("card", corners.to_vec(), vec![[0, 1, 2], [0, 2, 1]]);
+    let result = transfer(&sides, &card, None);
+    let areas = [0.5, 8.0 / 9.0];
+    let expected = areas.map(|area| area / (areas[0] + areas[1]));
+    assert!((0..3).all(|i| is_row(&result.weights, i, &expected)), "{:?}", dense(&result.weights, 0));
+}
