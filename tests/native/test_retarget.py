@@ -249,6 +249,32 @@ def test_biharmonic_matches_are_where_the_weights_come_from(native):
     assert half_l1(result, expected).mean() < 0.03
 
 
+def side_by_side(joined):
+    """Two tubes with bones of their own; `joined` by a strip between them they are one island."""
+    one = tube()
+    n, away = len(one.positions), np.array([1.5, 0, 0])
+    frames = one.frames.copy()
+    frames[:, :3, 3] += away
+    strip = [(16 * 12, 16 * 13, n + 16 * 12 + 8), (16 * 13, n + 16 * 13 + 8, n + 16 * 12 + 8)]
+    zero = np.zeros_like(one.weights)
+    return Character(
+        np.vstack([one.positions, one.positions + away]),
+        np.vstack([one.triangles, one.triangles + n, strip] if joined else [one.triangles, one.triangles + n]),
+        np.block([[one.weights, zero], [zero, one.weights]]),
+        list("abcdef"),
+        np.array([-1, 0, 1, -1, 3, 4]),
+        np.concatenate([one.frames, frames]),
+        np.tile(one.lengths, 2),
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_one_island_there_may_be_two_here(native, method):
+    target = side_by_side(joined=True)
+    result = retarget(native, side_by_side(joined=False), target, method=method, vertex_order=False)
+    assert half_l1(result, target.weights).mean() < 0.05
+
+
 def test_a_bone_without_a_partner_gives_its_share_to_its_ancestor(native):
     body = tube()
     result = retarget(native, body, body, bone_map=[0, 1, -1], source_parents=body.parents)

@@ -12,10 +12,10 @@ bpy = pytest.importorskip("bpy", reason="needs the bpy wheel")
 pytestmark = pytest.mark.usefixtures("native", "scene")
 
 
-def tube(around=16, along=24):
-    """A capped tube of radius 0.25 along x, and its two-bone armature."""
-    x, angle = np.linspace(-1, 1, along + 1), np.arange(around) * 2 * np.pi / around
-    positions = [(u, 0.25 * np.cos(a), 0.25 * np.sin(a)) for u in x for a in angle] + [(-1, 0, 0), (1, 0, 0)]
+def tube(around=16, along=24, reach=2.0):
+    """A capped tube of radius 0.25 along x, with two bones. Cells are a share of the size: a long tube has few."""
+    x, angle = np.linspace(-reach, reach, along + 1), np.arange(around) * 2 * np.pi / around
+    positions = [(u, 0.25 * np.cos(a), 0.25 * np.sin(a)) for u in x for a in angle] + [(-reach, 0, 0), (reach, 0, 0)]
     faces, ends = [], (len(positions) - 2, len(positions) - 1)
     for j in range(around):
         k = (j + 1) % around
@@ -27,7 +27,7 @@ def tube(around=16, along=24):
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     upper, lower = (rig.data.edit_bones.new(name) for name in ("Upper", "Lower"))
-    upper.head, upper.tail, lower.head, lower.tail = (-1, 0, 0), (0, 0, 0), (0, 0, 0), (1, 0, 0)
+    upper.head, upper.tail, lower.head, lower.tail = (-reach, 0, 0), (0, 0, 0), (0, 0, 0), (reach, 0, 0)
     lower.parent = upper
     bpy.ops.object.mode_set(mode="OBJECT")
     t = np.clip((np.array([p[0] for p in positions]) + 0.25) / 0.5, 0, 1)
@@ -107,6 +107,17 @@ def test_removing_leaves_no_trace(addon):
     assert (set(obj.keys()), [m.name for m in obj.modifiers]) == before
 
 
+@pytest.mark.parametrize("keys", [(), ("Basis", "Smile")])
+def test_a_pin_would_hide_the_keys(addon, keys):
+    obj, _ = tube()
+    for name in keys:
+        obj.shape_key_add(name=name)
+    obj.show_only_shape_key = True
+    with pytest.raises(RuntimeError, match="Limb shows one shape key alone: take the pin off"):
+        bpy.ops.skinwright.bake_correctives(samples=1)
+    assert [key.name for key in obj.data.shape_keys.key_blocks] == list(keys) if keys else not obj.data.shape_keys
+
+
 def test_other_keys_and_drivers_stay(addon):
     obj, _ = tube()
     obj.shape_key_add(name="Basis")
@@ -134,6 +145,41 @@ def test_a_cache_plays_what_the_solver_says(addon, tmp_path, kind):
         np.testing.assert_allclose(shown(obj), refiner.solve(pose(), quality="bake"), atol=2e-6)
     assert bpy.ops.skinwright.remove_refined_cache() == {"FINISHED"}
     assert [m.type for m in obj.modifiers] == ["ARMATURE"]
+
+
+def stretch_time(rig):
+    bpy.context.scene.render.frame_map_new = 200
+
+
+def show_at_rest(rig):
+    rig.data.pose_position = "REST"
+
+
+@pytest.mark.parametrize(("change", "sentence"), [(stretch_time, "stretches time"), (show_at_rest, "Pose Position")])
+def test_what_a_cache_could_not_play(addon, tmp_path, change, sentence):
+    obj, rig = tube()
+    change(rig)
+    path = tmp_path / "limb.pc2"
+    with pytest.raises(RuntimeError, match=sentence):
+        bpy.ops.skinwright.bake_refined_cache(filepath=str(path), frame_start=1, frame_end=2)
+    assert not path.exists()
+    assert [m.type for m in obj.modifiers] == ["ARMATURE"]
+
+
+@pytest.mark.parametrize("parented", [False, True])
+def test_the_preview_goes_where_the_object_goes(addon, parented):
+    obj, rig = tube()
+    obj.delta_location = (0, 0, 1)
+    before = set(bpy.data.objects.keys())
+    bpy.ops.skinwright.live_refine()
+    (copy,) = [other for other in bpy.data.objects if other.name not in before]
+    if parented:
+        obj.parent, rig.location, rig.scale = rig, (5, 0, 0), (2, 2, 2)
+    else:
+        obj.location, obj.rotation_euler = (0, 3, 0), (0.5, 0, 1)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(copy.matrix_world, obj.matrix_world, atol=1e-6)
+    bpy.ops.skinwright.live_refine()
 
 
 def test_the_preview_follows_and_leaves_no_trace(addon):

@@ -59,6 +59,7 @@ def steps(
     if max(-first, last) > poses.LAST_FRAME:
         raise SceneError(f"frames {first} to {last} are too far out: Blender shows none beyond {poses.LAST_FRAME}")
     mesh_cache.check(obj)
+    poses.check_shown(characters.rig_of(obj))
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)
     seen = Watched([obj, characters.rig_of(obj)])

@@ -22,6 +22,8 @@ def check(obj: bpy.types.Object) -> None:
         raise SceneError(f"{obj.name} shares its mesh with {shared[0]}: make it single-user, or both would change")
     if obj.data.shape_keys and not obj.data.shape_keys.use_relative:
         raise SceneError(f"{obj.name} has absolute shape keys: turn Relative on, correctives are relative")
+    if obj.show_only_shape_key:
+        raise SceneError(f"{obj.name} shows one shape key alone: take the pin off below its list of shape keys first")
 
 
 @contextmanager

@@ -16,6 +16,12 @@ def check(obj: bpy.types.Object) -> None:
     """Raise SceneError where a cache of the mesh's own vertices cannot be played."""
     if obj.library or obj.data.library:
         raise SceneError(f"{obj.name} is linked from another file: make it local before a modifier is added")
+    render = bpy.context.scene.render
+    if render.frame_map_old != render.frame_map_new:
+        raise SceneError(
+            f"the scene stretches time from {render.frame_map_old} to {render.frame_map_new} frames, and a cache would "
+            "be stretched once more: make both numbers of Time Stretching equal first"
+        )
     before = next((i for i, m in enumerate(obj.modifiers) if m.type == "ARMATURE"), 0)
     used = [m for m in list(obj.modifiers)[:before] if m.show_viewport or m.show_render]
     changing = [m.name for m in used if not modifiers.keeps_vertices(m) and m.type not in ("NODES", "TRIANGULATE")]

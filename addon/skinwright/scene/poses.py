@@ -17,6 +17,12 @@ LAST_FRAME = 1_048_574
 _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
 
+def check_shown(armature: bpy.types.Object) -> None:
+    """Raise SceneError for an armature that is shown at rest, whatever its action says."""
+    if armature.data.pose_position == "REST":
+        raise SceneError(f"{armature.name} is set to Rest Position, where nothing moves: set it to Pose Position")
+
+
 def keyframes(armature: bpy.types.Object, most: int) -> Iterator[str]:
     """The frames that have keys, at most so many, evenly chosen; yields "frame N"."""
     frames = keyed_frames(armature)

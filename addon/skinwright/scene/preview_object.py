@@ -4,6 +4,7 @@ import json
 
 import bpy
 import numpy as np
+from mathutils import Euler, Matrix, Quaternion
 from numpy.typing import NDArray
 
 MARK = "skinwright_preview_of"
@@ -23,9 +24,8 @@ def show(obj: bpy.types.Object) -> bpy.types.Object:
     last = max((i for i, m in enumerate(copy.modifiers) if m.type == "ARMATURE"), default=-1)
     for modifier in list(copy.modifiers)[: last + 1]:
         copy.modifiers.remove(modifier)
-    if copy.parent_type == "ARMATURE":
-        copy.parent_type = "OBJECT"  # as an armature parent it would be deformed once more
     copy.animation_data_clear()
+    _follow(copy, obj)
     copy.hide_select = copy.hide_render = True
     copy[MARK] = obj.name
     own = [c for c in obj.users_collection if c.is_editable and not c.override_library]
@@ -35,6 +35,15 @@ def show(obj: bpy.types.Object) -> bpy.types.Object:
         copy.local_view_set(view, True)
     _hide(obj)
     return copy
+
+
+def _follow(copy: bpy.types.Object, obj: bpy.types.Object) -> None:
+    """Let the copy be where the object is, however that is moved or parented."""
+    copy.constraints.clear()
+    copy.parent, copy.parent_type = obj, "OBJECT"
+    copy.delta_location, copy.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    copy.delta_rotation_euler, copy.delta_rotation_quaternion = Euler(), Quaternion()
+    copy.matrix_parent_inverse = copy.matrix_basis = Matrix.Identity(4)
 
 
 def _hide(obj: bpy.types.Object) -> None:

@@ -4,6 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::coupling::{place, shift};
+use super::holes::{Rim, fan};
 use super::joints::Member;
 use super::local::Local;
 
@@ -23,6 +24,7 @@ pub(super) struct Balloon {
     vertices: Vec<u32>,
     weights: Vec<f32>,
     triangles: Vec<[u32; 3]>,
+    rims: Vec<Rim>,
 }
 
 impl Balloon {
@@ -43,7 +45,9 @@ impl Balloon {
         let mut is_member = vec![false; local.particles.len()];
         vertices.iter().for_each(|&p| is_member[p as usize] = true);
         let triangles = local.triangles.iter().filter(|t| t.iter().any(|&p| is_member[p as usize])).copied().collect();
-        Self { vertices, weights: Vec::new(), triangles }
+        let rims =
+            local.rims.iter().filter(|rim| rim.iter().any(|side| is_member[side[0] as usize])).cloned().collect();
+        Self { vertices, weights: Vec::new(), triangles, rims }
     }
 
     /// Passes of means over the rings. What all of a ring agrees with stays as it is, so that only the borders between weights
@@ -77,9 +81,11 @@ impl Balloon {
     pub(super) fn volume(&self, apex: Vec3, at: impl Fn(u32) -> Vec3 + Sync) -> f64 {
         let corner = |p: u32| (at(p) - apex).as_dvec3();
         let part = |&[a, b, c]: &[u32; 3]| corner(a).dot(corner(b).cross(corner(c)));
+        let caps = self.rims.iter().flat_map(|rim| fan(rim, corner));
+        let caps: f64 = caps.map(|[a, b, c]| a.dot(b.cross(c))).sum();
         // Sums of runs in their order: the same for any number of threads.
         let runs = self.triangles.par_chunks(RUN).map(|run| run.iter().map(part).sum());
-        runs.collect::<Vec<f64>>().iter().sum()
+        runs.collect::<Vec<f64>>().iter().sum::<f64>() + caps
     }
 
     /// Moves skin outwards (or inwards) until the volume is `target`; `limit` is applied after every round. Returns what is

@@ -107,10 +107,10 @@ impl Contact {
         Self { at_rest: intersecting_pairs(&rest, &surface.triangles).into_iter().collect() }
     }
 
-    /// The pairs of all of the skin's triangles that do not intersect at rest.
-    pub(super) fn all_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
+    /// Pairs of one piece among all triangles of the skin that do not intersect at rest.
+    pub(super) fn all_own_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
         let all: Vec<u32> = (0..skin.triangles().len() as u32).collect();
-        self.pairs(skin, places, Suspects::all_of(&all), slabs)
+        self.own_pairs(skin, places, Suspects::all_of(&all), slabs)
     }
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and

@@ -53,10 +53,11 @@ impl Frame<'_> {
             // What does not move from here on is known to be clear of each other.
             cleared = if left == 0 { self.places() } else { Vec::new() };
         }
-        if self.prepared.surface.islands > 1 && self.settings.self_collision {
-            left = clock.time("contact", || self.pairs(&self.places()).len());
-        }
-        clock.time("contact", || self.undo_harm(pose, &axes, &lost, left));
+        clock.time("contact", || {
+            if self.undo_harm(pose, &axes, &lost, left) {
+                self.part(&suspects, &[]);
+            }
+        });
         self.clock = clock;
     }
 
@@ -102,8 +103,7 @@ impl Frame<'_> {
     /// hardly move rigidly about it, so that the body's whole volume decides if it is known; beside a chest not at all.
     fn inflate(&mut self, k: usize, axis: &Axis, pose: &[DAffine3], parted: &[u32]) -> f64 {
         let joint = self.active[k].joint;
-        let is_measured = joint.is_limb || joint.is_slim && !self.has_whole(pose);
-        if self.settings.volume == 0.0 || !is_measured {
+        if self.settings.volume == 0.0 || !self.is_measured(k, pose) {
             return f64::NAN;
         }
         let mut contacts = self.contacts(k, axis);
@@ -116,6 +116,12 @@ impl Frame<'_> {
             local.limit_skin(kernel, k, limits);
         });
         if target == 0.0 { 0.0 } else { missing / target }
+    }
+
+    /// Whether the volume about a joint means something.
+    pub(super) fn is_measured(&self, k: usize, pose: &[DAffine3]) -> bool {
+        let joint = self.active[k].joint;
+        joint.is_limb || joint.is_slim && !self.has_whole(pose)
     }
 
     pub(super) fn rest_volume(&self, balloon: &Balloon, k: usize) -> f64 {

@@ -17,6 +17,9 @@ const STEP: f32 = 0.25;
 /// Gap on each side of the plane, in radii, for a joint that has turned by a right angle or more.
 const GAP: f32 = 0.016;
 
+/// From this swing on (radians) skin past a joint is far from the line of the bone before it.
+const BENDS: f64 = 0.26;
+
 /// A joint that turns in this frame.
 #[derive(Debug)]
 pub(super) struct ActiveJoint<'a> {
@@ -27,6 +30,8 @@ pub(super) struct ActiveJoint<'a> {
     pub(super) swing: f32,
     /// What else it turns by, radians.
     pub(super) twist: f32,
+    /// How far the limb is straight above the joint and below it, up to the next joint that bends.
+    straight: [f32; 2],
 }
 
 /// The joints that turn, in order of bones.
@@ -38,7 +43,8 @@ pub(super) fn active_joints<'a>(joints: &'a [Joint], path: &Path<'_>, pose: &[DA
         let twist = (path.angle(joint.bone) - path.swing_angle(joint.bone)).max(0.0) as f32;
         let radii = (bend / 2.0).tan() + MARGIN + twist / std::f32::consts::PI;
         let reach = joint.radius * (radii / STEP).ceil() * STEP;
-        ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32, twist }
+        let straight = path.straight(joint.bone, BENDS).map(|length| length as f32);
+        ActiveJoint { joint, reach, swing: path.swing_angle(joint.bone) as f32, twist, straight }
     };
     joints.iter().filter(turns).map(active).collect()
 }
@@ -63,6 +69,12 @@ impl ActiveJoint<'_> {
         (self.joint.is_limb && bends).then_some(HalfSpace { origin: axis.origin, normal, gap })
     }
 
+    /// What the joint's region depends on.
+    pub(super) fn extent(&self) -> [f32; 3] {
+        let [above, below] = self.straight;
+        [self.reach, above, below]
+    }
+
     /// The particles that move freely.
     pub(super) fn free(&self) -> impl Iterator<Item = &Member> {
         self.joint.members.iter().filter(|member| member.along < self.reach)
@@ -70,7 +82,14 @@ impl ActiveJoint<'_> {
 
     /// The particles beyond, for twice as far again.
     pub(super) fn beyond(&self) -> impl Iterator<Item = &Member> {
-        self.joint.members.iter().filter(|member| (self.reach..3.0 * self.reach).contains(&member.along))
+        let beyond = self.joint.members.iter().filter(|member| (self.reach..3.0 * self.reach).contains(&member.along));
+        beyond.filter(|member| self.is_beside(member))
+    }
+
+    /// Whether a particle is beside the joint's own bones: past the next bend, their lines are not its limb's.
+    pub(super) fn is_beside(&self, member: &Member) -> bool {
+        let [above, below] = self.straight;
+        member.along < if member.side > 0.0 { below } else { above }
     }
 
     /// Nearest and farthest that a particle beyond the free ones may be from the bones: what skinning says matters more

@@ -14,56 +14,57 @@ const HARM: f64 = 0.1;
 impl Frame<'_> {
     /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
     /// once it is pressed into the plane. `left` is the number of pairs of triangles that pass through each other.
-    /// `missing` is the share of each joint's volume that balloons could not restore.
-    pub(super) fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], missing: &[f64], left: usize) {
-        let all = 0..self.active.len();
+    /// `missing` is the share of each joint's volume that balloons could not restore. Returns whether any was given back.
+    pub(super) fn undo_harm(&mut self, pose: &[DAffine3], axes: &[Axis], missing: &[f64], left: usize) -> bool {
         let lost =
             |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
-        let may_harm = |&k: &usize| left > 0 || missing[k].is_nan() || missing[k].abs() > HARM / 2.0;
-        let doubtful: Vec<usize> = all.clone().filter(may_harm).collect();
-        if doubtful.is_empty() {
-            return;
-        }
+        let may_harm = |&k: &usize| {
+            self.is_measured(k, pose) && (left > 0 || missing[k].is_nan() || missing[k].abs() > HARM / 2.0)
+        };
         let solved = self.places();
+        let doubtful: Vec<usize> = (0..self.active.len()).filter(may_harm).collect();
         let suspects: Vec<usize> = doubtful.into_iter().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
         if suspects.is_empty() && left == 0 {
-            return;
+            return false;
         }
         let skins = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
-        let totals = skins.each_ref().map(|skin| self.pairs(skin).len());
+        let totals = skins.each_ref().map(|skin| self.own_pairs(skin));
         let skin = &skins[usize::from(totals[1] < totals[0])];
-        for k in suspects {
-            if lost(self, k, &solved).abs() > lost(self, k, skin).abs() + HARM / 2.0 {
-                self.give_back(k, skin);
-            }
-        }
-        let most = totals[0].min(totals[1]);
-        let mut left = self.pairs(&self.places());
-        for k in all.clone() {
-            if left.len() <= most {
-                return;
+        let worse = |k: &usize| lost(self, *k, &solved).abs() > lost(self, *k, skin).abs() + HARM / 2.0;
+        let worse: Vec<usize> = suspects.into_iter().filter(worse).collect();
+        worse.iter().for_each(|&k| self.give_back(k, skin));
+        self.undo_folds(skin, totals[0].min(totals[1])) || !worse.is_empty()
+    }
+
+    /// Gives back joints until no more than `most` pairs are left; returns whether any was.
+    fn undo_folds(&mut self, skin: &[Vec3], most: usize) -> bool {
+        let (mut left, mut is_changed) = (self.own_pairs(&self.places()), false);
+        for k in 0..self.active.len() {
+            if left <= most {
+                return is_changed;
             }
             let before = self.local.particles.clone();
             self.give_back(k, skin);
-            let now = self.pairs(&self.places());
-            if now.len() < left.len() {
-                left = now;
+            let now = self.own_pairs(&self.places());
+            if now < left {
+                (left, is_changed) = (now, true);
             } else {
                 self.local.particles = before;
             }
         }
-        if left.len() > most {
-            all.for_each(|k| self.give_back(k, skin));
+        if left > most {
+            (0..self.active.len()).for_each(|k| self.give_back(k, skin));
         }
+        is_changed || left > most
     }
 
     pub(super) fn places(&self) -> Vec<Vec3> {
         self.local.particles.iter().map(place).collect()
     }
 
-    /// The pairs of the region's triangles that pass through each other, but for those that do at rest.
-    pub(super) fn pairs(&self, places: &[Vec3]) -> Vec<[u32; 2]> {
-        self.prepared.contact.all_pairs(&*self.local.region, places, &self.slabs)
+    /// How many pairs of the region's triangles pass through each other within one piece of the skin and do not at rest.
+    fn own_pairs(&self, places: &[Vec3]) -> usize {
+        self.prepared.contact.all_own_pairs(&*self.local.region, places, &self.slabs).len()
     }
 
     /// Puts a joint's skin where skinning has it.

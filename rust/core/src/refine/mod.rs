@@ -15,6 +15,7 @@ mod figures;
 mod finish;
 mod frame;
 mod harm;
+mod holes;
 mod joints;
 mod lattice;
 mod limiting;
@@ -30,6 +31,7 @@ mod projection;
 mod region;
 mod report;
 mod settings;
+mod size;
 mod skeleton;
 mod solver;
 mod surface;
@@ -150,12 +152,15 @@ impl Refiner {
     pub fn measure(&self, pose_from_rest: &[DAffine3], positions: &[[f32; 3]]) -> Result<(usize, Vec<JointMeasure>)> {
         check_length("positions", positions.len(), self.rest_positions.len())?;
         check_length("pose_from_rest", pose_from_rest.len(), self.weights.n_bones() as usize)?;
+        let size = size::of_body(&self.prepared.joints, pose_from_rest);
+        let pose = size::without(size, pose_from_rest);
         let surface = &self.prepared.surface;
-        let welded: Vec<[f32; 3]> = surface.source.iter().map(|&i| positions[i as usize]).collect();
+        let mut welded: Vec<[f32; 3]> = surface.source.iter().map(|&i| positions[i as usize]).collect();
+        size::scale(&mut welded, 1.0 / size);
         let in_cells =
             |&place: &[f32; 3]| ((Vec3::from(place).as_dvec3() - self.prepared.middle) / self.prepared.cell).as_vec3();
         let places: Vec<Vec3> = welded.iter().map(in_cells).collect();
-        let joints = figures::measure(&self.prepared, &self.settings, &self.prepared.in_cells(pose_from_rest), &places);
+        let joints = figures::measure(&self.prepared, &self.settings, &self.prepared.in_cells(&pose), &places);
         Ok((intersecting_pairs(&welded, &surface.triangles).len(), joints))
     }
 
@@ -167,9 +172,12 @@ impl Refiner {
         with_figures: bool,
     ) -> Result<(Vec<[f32; 3]>, Report)> {
         let start = std::time::Instant::now();
-        let mut positions = self.skinned(pose_from_rest)?;
+        check_length("pose_from_rest", pose_from_rest.len(), self.weights.n_bones() as usize)?;
+        let size = size::of_body(&self.prepared.joints, pose_from_rest);
+        let pose = size::without(size, pose_from_rest);
+        let mut positions = self.skinned(&pose)?;
         let skinned = start.elapsed().as_secs_f64() * 1e3;
-        let pose = self.prepared.in_cells(pose_from_rest);
+        let pose = self.prepared.in_cells(&pose);
         let work = Work { quality, kernel, with_figures };
         let mut solution = solver::solve(&self.prepared, &self.settings, &pose, &positions, work);
         let mut place = vec![None; self.prepared.surface.len()];
@@ -186,6 +194,7 @@ impl Refiner {
             solution.report.stages.push(("limbs", start.elapsed().as_secs_f64() * 1e3));
         }
         solution.report.stages.insert(0, ("skin", skinned));
+        size::scale(&mut positions, size);
         Ok((positions, solution.report))
     }
 
@@ -216,8 +225,9 @@ impl Refiner {
     /// By how much the volume of the skin at `places` (welded) differs from rest, as a share.
     fn lost(&self, places: &[Vec3]) -> f64 {
         let surface = &self.prepared.surface;
-        let now = surface.volume(|i| places[i as usize].as_dvec3());
-        (now / surface.volume(|i| surface.rest[i as usize]) - 1.0).abs()
+        let now: f64 = surface.volumes(|i| places[i as usize].as_dvec3()).iter().sum();
+        let at_rest: f64 = surface.volumes(|i| surface.rest[i as usize]).iter().sum();
+        (now / at_rest - 1.0).abs()
     }
 
     /// Positions (V, 3) of a pose by dual quaternions alone.

@@ -130,12 +130,12 @@ impl Prepared {
     }
 }
 
-/// The volume between the surface and the middle of its vertices, regardless of sign.
+/// The volume between the surface and the middle of its vertices, negative for a mesh that is inside out.
 fn enclosed(surface: &Surface) -> f64 {
     let middle = surface.rest.iter().sum::<DVec3>() / surface.len().max(1) as f64;
     let corner = |i: u32| surface.rest[i as usize] - middle;
     let parts = surface.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))));
-    parts.sum::<f64>().abs() / 6.0
+    parts.sum::<f64>() / 6.0
 }
 
 fn check(mesh: &TriMesh<'_>, weights: &Weights) -> Result<()> {

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::contact::Skin;
 use super::frame::ActiveJoint;
+use super::holes::Rim;
 use super::joints::Member;
 use super::prepared::Prepared;
 use super::projection::{Batch, Blocks, Colouring};
@@ -80,18 +81,20 @@ pub(super) struct Region {
     pub(super) triangle_names: Vec<u32>,
     /// And their connected components.
     pub(super) triangle_islands: Vec<u32>,
+    /// The openings that have all of their rim here.
+    pub(super) rims: Vec<Rim>,
 }
 
-/// The last region, for poses with the same joints and reaches: it depends on nothing else.
+/// The last region, for poses with the same joints and extents: it depends on nothing else.
 #[derive(Debug, Default)]
 pub(super) struct KeptRegion(Mutex<Option<Kept>>);
 
-type Kept = (Vec<(usize, u32)>, Arc<Region>);
+type Kept = (Vec<(usize, [u32; 3])>, Arc<Region>);
 
 impl KeptRegion {
     /// The region of these joints, made if it is not the last one.
     pub(super) fn region(&self, prepared: &Prepared, active: &[ActiveJoint<'_>]) -> Arc<Region> {
-        let key: Vec<_> = active.iter().map(|a| (a.joint.bone, a.reach.to_bits())).collect();
+        let key: Vec<_> = active.iter().map(|a| (a.joint.bone, a.extent().map(f32::to_bits))).collect();
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some((_, region)) = last.filter(|(known, _)| *known == key) {
             return region;
@@ -149,9 +152,17 @@ impl Region {
             known.map(|m| Member { particle: map(m.particle), ..*m }).collect::<Vec<_>>()
         };
         let free: Vec<Vec<Member>> = active.iter().map(|joint| members(&mut joint.free())).collect();
-        let limited = free.par_iter().map(|members| Limited::new(lattice, skin, members, nodes)).collect();
+        let limited = |(joint, members): (&ActiveJoint<'_>, &Vec<Member>)| {
+            let beside: Vec<Member> = members.iter().filter(|member| joint.is_beside(member)).copied().collect();
+            Limited::new(lattice, skin, &beside, nodes)
+        };
+        let limited = active.par_iter().zip(&free).map(limited).collect();
         let (ring_starts, rings) = rings(prepared, &global[nodes..], &local);
         let ring_lengths = lengths(prepared, &global, nodes, &ring_starts, &rings);
+        let local_rim = |rim: &Rim| -> Option<Rim> {
+            let named = rim.iter().map(|side| side.map(|i| map(surface(i))));
+            named.map(|side| (!side.contains(&NONE)).then_some(side)).collect()
+        };
         let named = |&t: &u32| prepared.surface.triangles[t as usize].map(|i| map(surface(i)));
         Self {
             nodes,
@@ -172,6 +183,7 @@ impl Region {
             triangles: chosen.triangles.iter().map(named).collect(),
             triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island(t)).collect(),
             triangle_names: chosen.triangles,
+            rims: prepared.surface.rims.iter().filter_map(local_rim).collect(),
             global,
         }
     }

@@ -101,6 +101,28 @@ impl<'a> Path<'a> {
         self.turns[bone].map_or(0.0, |turn| angle(turn.swing * rotation_of(&turn.rest)))
     }
 
+    /// How far the limb is straight above the head of `bone` and below it: up to the next joint that swings by more than
+    /// `most` (radians).
+    pub(super) fn straight(&self, bone: usize, most: f64) -> [f64; 2] {
+        let skeleton = self.skeleton;
+        let up = std::iter::successors(skeleton.parent(bone), |&at| skeleton.parent(at));
+        // Bones hang on each other without a loop, so that every way down ends.
+        let down = std::iter::successors(skeleton.next(bone), |&at| skeleton.next(at));
+        [self.first_bend(bone, up, most), self.first_bend(bone, down, most)]
+    }
+
+    fn first_bend(&self, from: usize, along: impl Iterator<Item = usize>, most: f64) -> f64 {
+        let (mut length, mut last) = (0.0, from);
+        for bone in along {
+            length += self.skeleton.segments[bone][0].distance(self.skeleton.segments[last][0]);
+            if self.swing_angle(bone) > most {
+                return length;
+            }
+            last = bone;
+        }
+        f64::INFINITY
+    }
+
     /// The bones' transforms when every swing has come `share` (0 to 1) of its way.
     pub(super) fn at(&self, share: f64) -> Vec<DAffine3> {
         let mut bones = self.pose.to_vec();

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::holes::{Rim, fan, rims};
 use super::morton::morton;
 use crate::adjacency::DisjointSets;
 use crate::mesh::TriMesh;
@@ -11,6 +12,9 @@ use crate::weld::Weld;
 const COINCIDENT: f64 = 1e-7;
 /// Steps of the Morton curve's grid along the bounding box' diagonal.
 const STEPS: f64 = (1 << 20) as f64;
+
+/// Area of the fans that close a component's openings beyond which it is a sheet, as a share of its own.
+const MOST_OPEN: f64 = 1.0 / 3.0;
 
 /// Welded vertices, their triangles and rings. Split seams of a mesh (UV, sharp edges) are closed by it.
 #[derive(Debug)]
@@ -26,8 +30,11 @@ pub(super) struct Surface {
     /// The connected component of each welded vertex, and how many there are.
     pub(super) island: Vec<u32>,
     pub(super) islands: usize,
-    /// Whether every edge has one triangle on each side, so that what is enclosed has a volume.
-    pub(super) is_closed: bool,
+    /// The openings of components that enclose a volume nevertheless.
+    pub(super) rims: Vec<Rim>,
+    /// Whether each component encloses a volume, and whether most of the skin does.
+    pub(super) is_solid: Vec<bool>,
+    pub(super) is_mostly_solid: bool,
     /// Neighbours along edges, compressed by vertex, ascending.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -48,17 +55,55 @@ impl Surface {
         let mut sets = DisjointSets::new(source.len());
         edges.iter().for_each(|&[i, j]| sets.union(i, j));
         let (island, islands) = sets.number(|i| starts[i as usize] < starts[i as usize + 1]);
-        let is_closed = is_closed(&triangles);
-        Self { rest, of_vertex, source, triangles, island, islands, is_closed, starts, neighbours, edges }
+        let rims = rims(&triangles, source.len());
+        let (is_solid, is_mostly_solid) = (Vec::new(), false);
+        let mut surface = Self {
+            rest,
+            of_vertex,
+            source,
+            triangles,
+            rims,
+            is_solid,
+            is_mostly_solid,
+            island,
+            islands,
+            starts,
+            neighbours,
+            edges,
+        };
+        surface.find_solids();
+        surface
+    }
+
+    /// Tells the components that enclose a volume from sheets, which have openings as large as themselves.
+    fn find_solids(&mut self) {
+        let (mut skin, mut open) = (vec![0.0; self.islands], vec![0.0; self.islands]);
+        let island = |vertex: u32| self.island[vertex as usize] as usize;
+        let at = |i: u32| self.rest[i as usize];
+        self.triangles.iter().for_each(|t| skin[island(t[0])] += area(t.map(at)));
+        self.rims.iter().for_each(|rim| open[island(rim[0][0])] += fan(rim, at).map(area).sum::<f64>());
+        let is_solid: Vec<bool> = skin.iter().zip(&open).map(|(skin, open)| *open <= MOST_OPEN * skin).collect();
+        let solid: f64 = skin.iter().zip(&is_solid).filter(|(_, is_solid)| **is_solid).map(|(skin, _)| skin).sum();
+        self.is_mostly_solid = solid > skin.iter().sum::<f64>() / 2.0;
+        self.rims.retain(|rim| is_solid[self.island[rim[0][0] as usize] as usize]);
+        self.is_solid = is_solid;
     }
 
     pub(super) fn len(&self) -> usize {
         self.rest.len()
     }
 
-    /// The signed volume enclosed by the triangles with vertices at `at`, if the surface is closed.
-    pub(super) fn volume(&self, at: impl Fn(u32) -> DVec3) -> f64 {
-        self.triangles.iter().map(|t| t.map(&at)).map(|[a, b, c]| a.dot(b.cross(c))).sum::<f64>() / 6.0
+    /// The signed volume that each component encloses with vertices at `at`, openings closed; 0 for sheets.
+    pub(super) fn volumes(&self, at: impl Fn(u32) -> DVec3) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.islands];
+        let mut add = |vertex: u32, [a, b, c]: [DVec3; 3]| {
+            volumes[self.island[vertex as usize] as usize] += a.dot(b.cross(c)) / 6.0;
+        };
+        self.triangles.iter().for_each(|t| add(t[0], t.map(&at)));
+        self.rims.iter().for_each(|rim| fan(rim, &at).for_each(|t| add(rim[0][0], t)));
+        let sheets = volumes.iter_mut().zip(&self.is_solid).filter(|(_, is_solid)| !**is_solid);
+        sheets.for_each(|(volume, _)| *volume = 0.0);
+        volumes
     }
 
     /// The vertices that share an edge with vertex `i`.
@@ -87,11 +132,8 @@ fn weld(mesh: &TriMesh<'_>) -> (Vec<u32>, Vec<u32>) {
     (of_vertex, order.iter().map(|&class| first[class as usize]).collect())
 }
 
-fn is_closed(triangles: &[[u32; 3]]) -> bool {
-    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-    sides.sort_unstable();
-    let once = sides.windows(2).all(|pair| pair[0] != pair[1]);
-    once && sides.iter().all(|&[i, j]| sides.binary_search(&[j, i]).is_ok())
+fn area([a, b, c]: [DVec3; 3]) -> f64 {
+    (b - a).cross(c - a).length() / 2.0
 }
 
 fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {

@@ -25,33 +25,46 @@ impl Frame<'_> {
         if self.settings.volume == 0.0 || trunk.is_empty() || !self.has_whole(pose) {
             return;
         }
-        let (missing, whole) = self.missing(skin);
-        let excess = missing - missing.clamp(-TOLERATED * whole, TOLERATED * whole);
-        if excess == 0.0 {
-            return;
+        let (members, kept) = (self.members(&trunk), self.kept(axes, parted));
+        let missing = self.missing(skin);
+        let all: f64 = missing.iter().map(|(_, whole)| whole.abs()).sum();
+        for (island, &(missing, whole)) in missing.iter().enumerate() {
+            let tolerated = TOLERATED * whole.abs();
+            let excess = (missing - missing.clamp(-tolerated, tolerated)).clamp(-MOST * all, MOST * all);
+            let members: Vec<Member> =
+                members.iter().filter(|m| self.island(m.particle) == Some(island)).copied().collect();
+            if excess != 0.0 && !members.is_empty() {
+                let balloon = Balloon::new(&self.local, &members, &kept);
+                self.inflate_by(&balloon, 6.0 * excess, axes, trunk[0]);
+            }
         }
-        let members = self.members(&trunk);
-        let kept = self.kept(axes, parted);
-        let balloon = Balloon::new(&self.local, &members, &kept);
-        let first = self.active[trunk[0]].joint;
-        let now = balloon.volume(axes[trunk[0]].origin, |p| place(&self.local.particles[p as usize]));
-        let target = now + 6.0 * excess.clamp(-MOST * whole, MOST * whole);
+    }
+
+    /// Six times the volume is `more` afterwards; limbs keep their limits.
+    fn inflate_by(&mut self, balloon: &Balloon, more: f64, axes: &[Axis], trunk: usize) {
+        let (apex, radius, kernel) = (axes[trunk].origin, self.active[trunk].joint.radius, self.kernel);
+        let target = balloon.volume(apex, |p| place(&self.local.particles[p as usize])) + more;
         let limbs = (0..self.active.len()).filter(|&k| self.active[k].joint.is_limb);
         let limits: Vec<_> = limbs.map(|k| (k, self.limits(k, &axes[k], 1.0))).collect();
-        let kernel = self.kernel;
-        balloon.inflate(&mut self.local, axes[trunk[0]].origin, target, first.radius, |local| {
+        balloon.inflate(&mut self.local, apex, target, radius, |local| {
             limits.iter().for_each(|&(k, limits)| local.limit_skin(kernel, k, limits));
         });
+    }
+
+    /// The connected component of a particle of the skin.
+    fn island(&self, particle: u32) -> Option<usize> {
+        let vertex = (self.local.global[particle as usize] as usize).checked_sub(self.prepared.node_count())?;
+        Some(self.prepared.surface.island[vertex] as usize)
     }
 
     /// Whether the body's volume is known, and that of rest.
     pub(super) fn has_whole(&self, pose: &[DAffine3]) -> bool {
         let is_rigid = |k: usize| (self.growth(k, pose) - 1.0).abs() < RIGID;
-        self.prepared.surface.is_closed && (0..self.active.len()).all(is_rigid)
+        self.prepared.surface.is_mostly_solid && (0..self.active.len()).all(is_rigid)
     }
 
-    /// The volume that is missing, in cells, and all of it at rest.
-    fn missing(&self, skin: &[[f32; 3]]) -> (f64, f64) {
+    /// The volume that each piece of the skin misses, in cells, and all of it at rest.
+    fn missing(&self, skin: &[[f32; 3]]) -> Vec<(f64, f64)> {
         let (prepared, surface) = (self.prepared, &self.prepared.surface);
         let in_cells = |&i: &u32| (Vec3::from(skin[i as usize]).as_dvec3() - prepared.middle) / prepared.cell;
         let mut places: Vec<DVec3> = surface.source.iter().map(in_cells).collect();
@@ -60,8 +73,8 @@ impl Frame<'_> {
             places[vertex] = place(&self.local.particles[p]).as_dvec3();
         }
         let at_rest = |i: u32| prepared.rest[prepared.node_count() + i as usize].as_dvec3();
-        let whole = surface.volume(at_rest);
-        (whole - surface.volume(|i| places[i as usize]), whole)
+        let now = surface.volumes(|i| places[i as usize]);
+        surface.volumes(at_rest).into_iter().zip(now).map(|(whole, now)| (whole - now, whole)).collect()
     }
 
     /// The free members of some joints, each particle once, ascending.

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::biharmonic::BiharmonicEmbedding;
 use crate::error::{Error, Result};
+use crate::progress::Progress;
 use crate::registration::Match;
 
 /// Source vertices that are blended.
@@ -81,12 +82,16 @@ pub fn landmarks_of_matches(vertices: &[u32], matches: &[Match]) -> Vec<Landmark
 
 /// The blend for each vertex of the target (V), None where its island has too few landmarks on one island of the source. The
 /// first `given` landmarks are the artist's.
+///
+/// # Errors
+/// [`Error::Cancelled`].
 pub fn blends(
     source: &Described<'_>,
     target: &Described<'_>,
     landmarks: &[Landmark],
     given: usize,
-) -> Vec<Option<Blend>> {
+    progress: &Progress,
+) -> Result<Vec<Option<Blend>>> {
     let mut blends = vec![None; target.islands.len()];
     for (target_island, source_island) in island_pairs(source, target, landmarks) {
         let on_both = |l: &Landmark| {
@@ -95,27 +100,22 @@ pub fn blends(
         let kept = landmarks[..given].iter().filter(|l| on_both(l)).count();
         let own = spread(landmarks.iter().filter(|l| on_both(l)).copied().collect(), kept, target.embedding);
         let ends = |of: fn(&Landmark) -> u32| own.iter().map(of).collect::<Vec<u32>>();
+        progress.check()?;
         let source_rows = Descriptions::new(source, source_island, &ends(|l| l.source));
+        progress.check()?;
         let target_rows = Descriptions::new(target, target_island, &ends(|l| l.target));
         let candidates = source_rows.by_region(source);
-        let found: Vec<Blend> = target_rows
-            .vertices
-            .par_iter()
-            .enumerate()
-            .map(|(k, &i)| {
-                let near: Vec<&[u32]> = target.regions[i as usize]
-                    .iter()
-                    .filter_map(|r| candidates.get(*r as usize))
-                    .map(Vec::as_slice)
-                    .collect();
-                source_rows.nearest(target_rows.row(k), &near)
-            })
-            .collect();
+        let best = |(k, &i): (usize, &u32)| {
+            progress.check()?;
+            let near = target.regions[i as usize].iter().filter_map(|&r| candidates.get(r as usize));
+            Ok(source_rows.nearest(target_rows.row(k), &near.map(Vec::as_slice).collect::<Vec<_>>()))
+        };
+        let found: Vec<Blend> = target_rows.vertices.par_iter().enumerate().map(best).collect::<Result<_>>()?;
         for (&i, blend) in target_rows.vertices.iter().zip(found) {
             blends[i as usize] = Some(blend);
         }
     }
-    blends
+    Ok(blends)
 }
 
 /// The first `kept` landmarks, then always the one that is farthest from those chosen, [`MOST`] in all.

@@ -100,39 +100,9 @@ impl<'a> Prepared<'a> {
         rows: &mut [Row],
         progress: &Progress,
     ) -> Result<(usize, usize)> {
-        let [source, target] = self.characters;
         let landmarks = self.landmarks(placed);
-        let (source_spectrum, mut source_islands) = self.spectrum(&source.mesh, &self.source, progress)?;
-        // One vertex of each place is a candidate, or its copies would crowd out the next ones.
-        let first = self.source.spread(&self.source.first);
-        std::iter::zip(0.., &first)
-            .filter(|(i, first)| i != *first)
-            .for_each(|(i, _)| source_islands[i as usize] = NONE);
-        let one = |l: &Landmark| Landmark { source: first[l.source as usize], ..*l };
-        let landmarks: Vec<Landmark> = landmarks.iter().map(one).collect();
-        let (target_spectrum, target_islands) = self.spectrum(&target.mesh, &self.target, progress)?;
-        let source_normals = self.source.spread(&placed.source_normals);
-        let target_normals = self.target.spread(&placed.normals);
-        let regions = [(&self.source, 0), (&self.target, 1)].map(|(welded, side)| self.regions(welded, side));
-        let blends = blends(
-            &Described {
-                embedding: &source_spectrum,
-                islands: &source_islands,
-                normals: &source_normals,
-                regions: &regions[0],
-            },
-            &Described {
-                embedding: &target_spectrum,
-                islands: &target_islands,
-                normals: &target_normals,
-                regions: &regions[1],
-            },
-            &landmarks,
-            self.correspondence.landmarks.len(),
-        );
-        progress.check()?;
         let mut count = 0;
-        for (blend, &u) in std::iter::zip(blends, &self.target.of_vertex) {
+        for (blend, &u) in std::iter::zip(self.blends(placed, &landmarks, progress)?, &self.target.of_vertex) {
             if let Some(blend) = blend {
                 let position = self.target.positions[u as usize];
                 self.rematch(placed, u as usize, &blend);
@@ -141,6 +111,42 @@ impl<'a> Prepared<'a> {
             }
         }
         Ok((landmarks.len(), count))
+    }
+
+    /// The source vertices of each vertex of the target (V), None where the match by the skeleton stands: on islands without
+    /// enough landmarks, and where that match is on another island, as characters may be cut into islands differently.
+    fn blends(&self, placed: &Placed, landmarks: &[Landmark], progress: &Progress) -> Result<Vec<Option<Blend>>> {
+        let [source, target] = self.characters;
+        let (source_spectrum, islands) = self.spectrum(&source.mesh, &self.source, progress)?;
+        let (target_spectrum, target_islands) = self.spectrum(&target.mesh, &self.target, progress)?;
+        // One vertex of each place is a candidate, or its copies would crowd out the next ones.
+        let first = self.source.spread(&self.source.first);
+        let candidate = |(i, &island): (usize, &u32)| if first[i] as usize == i { island } else { NONE };
+        let one = |l: &Landmark| Landmark { source: first[l.source as usize], ..*l };
+        let landmarks: Vec<Landmark> = landmarks.iter().map(one).collect();
+        let mut blends = blends(
+            &Described {
+                embedding: &source_spectrum,
+                islands: &islands.iter().enumerate().map(candidate).collect::<Vec<_>>(),
+                normals: &self.source.spread(&placed.source_normals),
+                regions: &self.regions(&self.source, 0),
+            },
+            &Described {
+                embedding: &target_spectrum,
+                islands: &target_islands,
+                normals: &self.target.spread(&placed.normals),
+                regions: &self.regions(&self.target, 1),
+            },
+            &landmarks,
+            self.correspondence.landmarks.len(),
+            progress,
+        )?;
+        for (blend, &u) in std::iter::zip(&mut blends, &self.target.of_vertex) {
+            let by_skeleton = islands[placed.matches[u as usize].corners[0] as usize];
+            *blend = blend.filter(|blend| islands[blend[0].0 as usize] == by_skeleton);
+        }
+        progress.check()?;
+        Ok(blends)
     }
 
     /// Biharmonic coordinates and island of every vertex (V) of a mesh whose coincident vertices are one.

@@ -1,5 +1,6 @@
 //! Gradients by finite differences, single projections, kernels against their scalar twin.
 
+mod holes;
 mod sweeps;
 
 use glam::Vec3;
