@@ -13,7 +13,7 @@ use glam::DVec3;
 use skinwright_core::transfer::{
     Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Transfer, transfer_weights,
 };
-use skinwright_core::{Progress, Weights};
+use skinwright_core::{Error, Progress, Weights};
 use walls::{dense, is_row, level, shaft, source, target, wall};
 
 fn any_angle() -> Settings {
@@ -117,4 +117,39 @@ fn a_part_out_of_the_papers_reach_hangs_unless_a_vertex_is_forced() {
         assert!(result.report.unmatched_islands.is_empty());
     }
     assert_eq!(forced.confidence[30], 1.0);
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let refused = |settings: Settings| match settings.check() {
+        Err(Error::InvalidParameter { name, .. }) => name,
+        other => panic!("{other:?}"),
+    };
+    let base = Settings::default;
+    assert!(base().check().is_ok());
+    for bad in [-0.1, f64::NAN, f64::INFINITY] {
+        for length in [Length::Absolute(bad), Length::Relative(bad)] {
+            assert_eq!(refused(Settings { max_distance: length, ..base() }), "max_distance");
+            assert_eq!(refused(Settings { weld_tolerance: length, ..base() }), "weld_tolerance");
+            assert_eq!(refused(Settings { smoothness_length: length, ..base() }), "smoothness_length");
+        }
+        assert_eq!(refused(Settings { softness: bad, ..base() }), "softness");
+        assert_eq!(refused(Settings { max_normal_angle: bad, ..base() }), "max_normal_angle");
+        assert_eq!(refused(Settings { smoothing_factor: bad, ..base() }), "smoothing_factor");
+    }
+    assert_eq!(refused(Settings { softness: 0.0, ..base() }), "softness");
+    assert_eq!(refused(Settings { smoothing_factor: 1.01, ..base() }), "smoothing_factor");
+    let zero = Length::Absolute(0.0);
+    let least = Settings { max_distance: zero, weld_tolerance: zero, smoothness_length: zero, ..base() };
+    assert!(Settings { max_normal_angle: 0.0, smoothing_factor: 1.0, ..least }.check().is_ok());
+}
+
+#[test]
+fn every_stage_books_its_seconds() {
+    let result = transfer_weights(&shaft(1.0), target(&level(0.3)), None, &any_angle()).unwrap();
+    let stages: Vec<_> = result.report.seconds.iter().map(|&(stage, _)| stage).collect();
+    let preparation = ["laplacian", "match"];
+    let solve = ["assemble", "factor", "solve", "inpaint", "smooth", "islands and limit"];
+    assert_eq!(stages, [&preparation[..], &solve].concat());
+    assert!(result.report.seconds.iter().all(|&(_, seconds)| seconds >= 0.0));
 }
