@@ -142,12 +142,13 @@ fn a_plate_over_a_valley_gets_the_rows_of_the_four_solves() {
 
 #[test]
 fn a_card_in_the_middle_takes_both_sides_by_area() {
-    // Each vertex is as near to the inside of a triangle of one wall as to that of a larger one of the other.
-    let sides = parts_with_bones(&[wall(-1.0, 1, 4.0, 4), wall(1.0, -1, 4.0, 3)]);
-    let corners = [[0.0, 0.1, 0.3], [0.0, 0.2, 0.45], [0.0, -0.3, 0.4]];
-    let card = Fixture::new("card", corners.to_vec(), vec![[0, 1, 2], [0, 2, 1]]);
-    let result = transfer(&sides, &card, None);
-    let areas = [0.5, 8.0 / 9.0];
-    let expected = areas.map(|area| area / (areas[0] + areas[1]));
-    assert!((0..3).all(|i| is_row(&result.weights, i, &expected)), "{:?}", dense(&result.weights, 0));
+    // Each vertex is as near to the inside of a triangle of one wall as to that of one of the other, larger or equal.
+    let corners = vec![[0.0, 0.1, 0.3], [0.0, 0.2, 0.45], [0.0, -0.3, 0.4]];
+    let card = Fixture::new("card", corners, vec![[0, 1, 2], [0, 2, 1]]);
+    for (n, area) in [(3, 8.0 / 9.0), (4, 0.5)] {
+        let sides = parts_with_bones(&[wall(-1.0, 1, 4.0, 4), wall(1.0, -1, 4.0, n)]);
+        let result = transfer(&sides, &card, None);
+        let expected = [0.5, area].map(|share| share / (0.5 + area));
+        assert!((0..3).all(|i| is_row(&result.weights, i, &expected)), "{n}: {:?}", dense(&result.weights, 0));
+    }
 }

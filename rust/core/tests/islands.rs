@@ -8,7 +8,7 @@ mod walls;
 
 use common::Fixture;
 use skinwright_core::transfer::{
-    IslandPolicy, Length, MaskValue, Settings, SmallIslands, Source, Transfer, transfer_weights,
+    IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, Transfer, transfer_weights,
 };
 use walls::{dense, is_row, relief, source, target, wall};
 
@@ -55,6 +55,15 @@ fn small_parts_become_rigid_and_large_ones_do_not() {
     let solved = Settings { small_islands: SmallIslands::Solved, ..rigid() };
     let button = triangle([0.5; 3], [0.3, 0.4], 0.0);
     assert_eq!(transfer(&slope(0.2), &button, &solved).report.rigid_islands, 0);
+}
+
+#[test]
+fn by_default_the_method_of_confidences_makes_parts_rigid() {
+    for method in MatchMethod::ALL {
+        let settings = Settings { method, small_islands: SmallIslands::Auto, ..rigid() };
+        let result = transfer(&slope(0.2), &wall(0.3, 1, 0.3, 2), &settings);
+        assert_eq!(result.report.rigid_islands == 1, method == MatchMethod::Confidence, "{method:?}");
+    }
 }
 
 #[test]

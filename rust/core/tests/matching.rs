@@ -7,13 +7,13 @@ mod common;
 mod walls;
 
 use common::Fixture;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use skinwright_core::Progress;
 use skinwright_core::transfer::{
     Inpainting, Length, MaskValue, MatchMethod, Settings, Source, Transfer, transfer_weights,
 };
-use std::f64::consts::{FRAC_PI_2, PI};
-use walls::{dense, is_row, parts_with_bones, relief, target, wall};
+use std::f64::consts::PI;
+use walls::{dense, is_row, level, parts_with_bones, relief, shaft, target, wall};
 
 fn transfer(source: &Source, fixture: &Fixture, settings: &Settings) -> Transfer {
     transfer_weights(source, target(fixture), None, settings).unwrap()
@@ -23,33 +23,20 @@ fn within(max_distance: f64) -> Settings {
     Settings { max_distance: Length::Absolute(max_distance), ..Settings::default() }
 }
 
-/// A shaft of four walls around the y axis: bones 0 and 1 at x = -1 and 1, bones 2 and 3 at z = -1 and 1, all facing inwards.
-fn shaft() -> Source {
-    let turned = |p: DVec3| DQuat::from_rotation_y(-FRAC_PI_2) * p;
-    // The walls' triangles differ, so that points on edges and corners tie with points in the middle of others.
-    let sides = [wall(-1.0, 1, 1.9, 4), wall(1.0, -1, 1.9, 3)];
-    let ends = [wall(-1.0, 1, 1.9, 2), wall(1.0, -1, 1.9, 5)].map(|wall| wall.mapped(turned));
-    parts_with_bones(&[sides, ends].concat())
-}
-
-/// A sheet of 3 x 3 vertices at height y = `height`, half a unit apart, whose normals point along y.
-fn level(height: f64) -> Fixture {
-    wall(height, 1, 1.0, 2).mapped(|p| DVec3::new(p.y, p.x, -p.z)).named("level sheet")
-}
-
 #[test]
 fn equally_near_places_share_a_vertex() {
     let any_angle = Settings { max_normal_angle: PI, average_ties: true, ..within(3.0) };
-    for height in [0.0, 0.3, 0.475, 0.51] {
-        let sheet = level(height);
-        let result = transfer(&shaft(), &sheet, &any_angle);
+    for (height, scale) in [(0.0, 1.0), (0.3, 1.0), (0.475, 1.0), (0.51, 1.0), (0.3, 0.01), (0.3, 64.0)] {
+        let sheet = level(height).mapped(|p| p * scale);
+        let any_angle = Settings { max_distance: Length::Absolute(3.0 * scale), ..any_angle.clone() };
+        let result = transfer(&shaft(scale), &sheet, &any_angle);
         for (i, &[x, _, z]) in sheet.positions.iter().enumerate() {
             let reached = [-x, x, -z, z].map(|toward| toward >= x.abs().max(z.abs()));
             let count = reached.iter().filter(|&&is_reached| is_reached).count() as f32;
             let expected = reached.map(|is_reached| if is_reached { 1.0 / count } else { 0.0 });
             assert!(is_row(&result.weights, i, &expected), "{height}, {x} {z}: {:?}", dense(&result.weights, i));
         }
-        let single = transfer(&shaft(), &sheet, &Settings { average_ties: false, ..any_angle.clone() });
+        let single = transfer(&shaft(1.0), &sheet, &Settings { average_ties: false, ..any_angle.clone() });
         assert!((0..9).all(|i| single.weights.row(i).0.len() == 1), "the first place counts alone");
     }
 }
@@ -58,12 +45,12 @@ fn equally_near_places_share_a_vertex() {
 fn of_equally_near_places_those_whose_normals_agree_best_count() {
     let settings = Settings { max_normal_angle: PI, average_ties: true, ..within(3.0) };
     for (facing, bone) in [(1, 0), (-1, 1)] {
-        let result = transfer(&shaft(), &wall(0.0, facing, 0.2, 2), &settings);
+        let result = transfer(&shaft(1.0), &wall(0.0, facing, 0.2, 2), &settings);
         assert_eq!(result.weights.row(4), (&[bone][..], &[1.0][..]));
     }
     // A hair's breadth from the middle one place is nearer; on the surface there are no two.
     let aside = level(0.1).mapped(|p| p + DVec3::X * 1e-5);
-    assert_eq!(transfer(&shaft(), &aside, &settings).weights.row(4).0, [1]);
+    assert_eq!(transfer(&shaft(1.0), &aside, &settings).weights.row(4).0, [1]);
     let back_to_back = parts_with_bones(&[wall(0.0, 1, 2.0, 4), wall(0.0, -1, 2.0, 4)]);
     let result = transfer(&back_to_back, &wall(0.0, 1, 1.0, 3), &settings);
     assert!((0..16).all(|i| result.weights.row(i).0.len() == 1));
@@ -123,6 +110,10 @@ fn a_face_that_looks_the_right_way_is_looked_for_near_by() {
     // Right at the flipped face a hundredth of the body's diagonal is enough.
     let close = transfer(&thighs(-0.015, 0.021, 4.0), &trouser(-0.01, 0.02), &within(0.3));
     assert!(follows(&close, 0));
+    // Where either side will do, none is looked for.
+    let either = Settings { max_normal_angle: 2.0, ..within(0.3) };
+    let any = transfer(&thighs(-0.1, 0.1, 4.0), &trouser(-0.05, 0.02), &either);
+    assert!(is_row(&any.weights, middle, &[0.0, 1.0]));
     // Nothing beyond the largest distance counts.
     let strict = transfer(&thighs(-0.1, 0.1, 4.0), &trouser(-0.05, 0.02), &within(0.11));
     assert!(is_row(&strict.weights, middle, &[0.0, 1.0]));
@@ -205,6 +196,7 @@ fn what_is_known_before_a_solve_is_what_the_solve_says() {
         assert_eq!((matched.unwrap(), confidence.unwrap()), (result.matched, result.confidence));
         assert_eq!(kept.distances(), result.distances);
         assert_eq!(kept.angles()[..50], result.angles[..50]);
+        assert!(result.angles[50].is_nan(), "it has no normal");
         let islands = kept.island_of_vertex();
         assert!(islands[..50].iter().all(|&island| island == islands[0]) && islands[50] != islands[0]);
         assert_eq!((result.report.welded, result.report.islands, result.report.loose), (5, 1, 1));

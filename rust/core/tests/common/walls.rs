@@ -1,7 +1,7 @@
 //! Bodies made of flat walls, on which closest points and normals are known without a computer.
 
 use super::common::{Fixture, Row};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use skinwright_core::Weights;
 use skinwright_core::transfer::{Source, TargetMesh};
 
@@ -72,4 +72,19 @@ pub fn distance_to_triangle(p: DVec3, corners: [DVec3; 3]) -> f64 {
     let to_side =
         |(s, e): (DVec3, DVec3)| p.distance(s.lerp(e, ((p - s).dot(e - s) / e.distance_squared(s)).clamp(0.0, 1.0)));
     sides.map(to_side).into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// A shaft of four walls around the y axis: bones 0 and 1 at x = -1 and 1, bones 2 and 3 at z = -1 and 1, all facing inwards.
+pub fn shaft(scale: f64) -> Source {
+    let turned = |p: DVec3| DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2) * p;
+    // The walls' triangles differ, so that points on edges and corners tie with points in the middle of others.
+    let sides = [wall(-1.0, 1, 1.9, 4), wall(1.0, -1, 1.9, 3)];
+    let ends = [wall(-1.0, 1, 1.9, 2), wall(1.0, -1, 1.9, 5)].map(|wall| wall.mapped(turned));
+    let walls: Vec<Fixture> = [sides, ends].concat().iter().map(|wall| wall.mapped(|p| p * scale)).collect();
+    parts_with_bones(&walls)
+}
+
+/// A sheet of 3 x 3 vertices at height y = `height`, half a unit apart, whose normals point along y.
+pub fn level(height: f64) -> Fixture {
+    wall(height, 1, 1.0, 2).mapped(|p| DVec3::new(p.y, p.x, -p.z)).named("level sheet")
 }
