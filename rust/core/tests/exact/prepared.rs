@@ -1,20 +1,14 @@
 //! What a prepared target does again for other settings and other weights of the source, against one that is prepared for them.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
 use std::f64::consts::PI;
 
-use common::Fixture;
+use crate::common::Fixture;
+use crate::walls::{dense, is_row, level, shaft, source, target, wall};
 use glam::DVec3;
 use skinwright_core::transfer::{
     Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Transfer, transfer_weights,
 };
 use skinwright_core::{Error, Progress, Weights};
-use walls::{dense, is_row, level, shaft, source, target, wall};
 
 fn any_angle() -> Settings {
     Settings { max_normal_angle: PI, max_distance: Length::Absolute(3.0), ..Settings::default() }

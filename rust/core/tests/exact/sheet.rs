@@ -1,6 +1,6 @@
 //! A small sheet and what is known of it, for tests of filling.
 
-use super::common::{Fixture, noise};
+use crate::common::{Fixture, noise};
 use skinwright_core::fill::{Constraint, Filled, Row};
 
 pub const COLUMNS: usize = 3;

@@ -1,16 +1,8 @@
 //! Filling against dense systems that are assembled and eliminated here.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/dense.rs"]
-mod dense;
-#[path = "common/sheet.rs"]
-mod sheet;
-
-use common::{Fixture, noise};
-use dense::{Matrix, energy, solved, stiffness_and_masses};
-use sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
+use crate::common::{Fixture, noise};
+use crate::dense::{Matrix, energy, solved, stiffness_and_masses};
+use crate::sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
 use skinwright_core::fill::{Constraint, Fill, Row};
 use skinwright_core::{Error, Progress, Weld};
 

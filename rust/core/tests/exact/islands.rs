@@ -1,16 +1,10 @@
 //! Loose parts over a flat wall whose weights are linear in y: what each choice gives them is known in closed form.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
-use common::Fixture;
+use crate::common::Fixture;
+use crate::walls::{dense, is_row, relief, source, target, wall};
 use skinwright_core::transfer::{
     IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, Transfer, transfer_weights,
 };
-use walls::{dense, is_row, relief, source, target, wall};
 
 /// A wall at x = 0, 4 wide, facing along x; the weight of bone 1 is y times `slope` and a half, that of bone 0 the rest.
 fn slope(slope: f32) -> Source {

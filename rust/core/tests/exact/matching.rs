@@ -1,19 +1,13 @@
 //! Which point of a body of flat walls a vertex takes its weights from.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
-use common::Fixture;
+use crate::common::Fixture;
+use crate::walls::{dense, is_row, level, parts_with_bones, relief, shaft, target, wall};
 use glam::DVec3;
 use skinwright_core::Progress;
 use skinwright_core::transfer::{
     Inpainting, Length, MaskValue, MatchMethod, Settings, Source, Transfer, transfer_weights,
 };
 use std::f64::consts::PI;
-use walls::{dense, is_row, level, parts_with_bones, relief, shaft, target, wall};
 
 fn transfer(source: &Source, fixture: &Fixture, settings: &Settings) -> Transfer {
     transfer_weights(source, target(fixture), None, settings).unwrap()

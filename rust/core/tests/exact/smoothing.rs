@@ -1,17 +1,11 @@
 //! Smoothing after the solve against its formula.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
 use std::collections::BTreeSet;
 
-use common::{body, skirt};
+use crate::common::{body, skirt};
+use crate::walls::{dense, source, target};
 use glam::Vec3;
 use skinwright_core::transfer::{Length, Settings, Transfer, transfer_weights};
-use walls::{dense, source, target};
 
 fn transfer(settings: &Settings) -> Transfer {
     let (fixture, rows) = body();

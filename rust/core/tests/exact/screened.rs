@@ -1,17 +1,8 @@
 //! Screened filling against the four dense solves that it stands for.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/dense.rs"]
-mod dense;
-#[allow(dead_code)]
-#[path = "common/sheet.rs"]
-mod sheet;
-
-use common::noise;
-use dense::{Screened, stiffness_and_masses};
-use sheet::{assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
+use crate::common::noise;
+use crate::dense::{Screened, stiffness_and_masses};
+use crate::sheet::{assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
 use skinwright_core::Progress;
 use skinwright_core::fill::{Constraint, Fill, GivenRows, Patch, Ragged, Row, RowTable, Screen, screened};
 

@@ -1,15 +1,9 @@
 //! The points that the method of confidences chooses, against a search through all triangles.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
-use common::Fixture;
+use crate::common::Fixture;
+use crate::walls::{dense, distance_to_triangle, parts_with_bones, relief, target, wall};
 use glam::{DVec3, Vec3};
 use skinwright_core::transfer::{Length, MatchMethod, Settings, transfer_weights};
-use walls::{dense, distance_to_triangle, parts_with_bones, relief, target, wall};
 
 /// A triangle of the body as one vertex sees it.
 struct Found {

@@ -1,21 +1,12 @@
 //! The method of confidences against its formulas, over bodies where closest points are known in closed form.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/dense.rs"]
-mod dense;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
-use common::Fixture;
-use dense::{Screened, stiffness_and_masses};
+use crate::common::Fixture;
+use crate::dense::{Screened, stiffness_and_masses};
+use crate::walls::{dense, is_row, parts_with_bones, relief, source, target, wall};
 use glam::{DVec2, DVec3, Vec3};
 use skinwright_core::transfer::{
     Length, MaskValue, MatchMethod, Settings, SmallIslands, Source, Transfer, transfer_weights,
 };
-use walls::{dense, is_row, parts_with_bones, relief, source, target, wall};
 
 const SOFTNESS: f64 = 0.7;
 

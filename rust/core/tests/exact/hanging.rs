@@ -1,15 +1,9 @@
 //! Parts that hang on a garment and on each other, against Prim's algorithm over all pairs.
 
-#[allow(dead_code)]
-mod common;
-#[allow(dead_code)]
-#[path = "common/walls.rs"]
-mod walls;
-
-use common::{Fixture, noise};
+use crate::common::{Fixture, noise};
+use crate::walls::{dense, distance_to_triangle, is_row, relief, source, target, wall};
 use glam::{DVec3, Vec3};
 use skinwright_core::transfer::{IslandPolicy, Length, MaskValue, Settings, Source, Transfer, transfer_weights};
-use walls::{dense, distance_to_triangle, is_row, relief, source, target, wall};
 
 /// A body far behind everything, so that parts hang on the garment; its weights are linear in y and tell where.
 fn body() -> Source {

@@ -1,6 +1,6 @@
 //! Bodies made of flat walls, on which closest points and normals are known without a computer.
 
-use super::common::{Fixture, Row};
+use crate::common::{Fixture, Row};
 use glam::{DQuat, DVec3};
 use skinwright_core::Weights;
 use skinwright_core::transfer::{Source, TargetMesh};

@@ -1,6 +1,6 @@
 //! Dense systems, written from the papers: cotangent stiffness, mixed Voronoi areas, and elimination with pivoting.
 
-use super::common::Fixture;
+use crate::common::Fixture;
 use glam::{DVec3, Vec3};
 
 pub type Matrix = Vec<Vec<f64>>;
