@@ -10,6 +10,12 @@ use super::solver::Frame;
 
 /// Loss of a joint's volume from which it is asked whether skinning did better.
 const HARM: f64 = 0.1;
+/// Joints of a smaller radius, in cells, are judged by the volume about them whatever they are, and by their edges: a ball in a
+/// finger's joint has no room in cells larger than it is.
+const SMALL: f32 = 1.0;
+/// Share of a small joint's skin that may have edges of [`LONG`] times their length at rest, beyond what skinning stretches.
+const TORN: f64 = 0.05;
+const LONG: f32 = 2.0;
 
 impl Frame<'_> {
     /// Gives joints back to skinning where solving has done worse: on very coarse skin nothing is left of the inner side
@@ -19,20 +25,36 @@ impl Frame<'_> {
         let lost =
             |frame: &Self, k: usize, places: &[Vec3]| frame.measure(k, pose, &axes[k], &|p| places[p as usize]).0;
         let is_restored = |k: usize| missing[k].abs() <= HARM / 2.0;
-        let may_harm = |&k: &usize| self.is_measured(k, pose) && (left > 0 || !is_restored(k));
+        let is_small = |k: usize| self.active[k].joint.radius < SMALL;
+        let is_judged = |k: usize| self.is_measured(k, pose) || is_small(k);
+        let may_harm = |&k: &usize| is_judged(k) && (left > 0 || !is_restored(k));
         let solved = self.places();
         let doubtful: Vec<usize> = (0..self.active.len()).filter(may_harm).collect();
         let suspects: Vec<usize> = doubtful.into_iter().filter(|&k| lost(self, k, &solved).abs() > HARM).collect();
-        if suspects.is_empty() && left == 0 {
+        let torn: Vec<usize> =
+            (0..self.active.len()).filter(|&k| is_small(k) && self.torn(k, &solved) > TORN).collect();
+        if suspects.is_empty() && torn.is_empty() && left == 0 {
             return false;
         }
         let skins = [skinned, linear].map(|skin| skin(self.prepared, &self.local.region, pose));
         let totals = skins.each_ref().map(|skin| self.own_pairs(skin));
         let skin = &skins[usize::from(totals[1] < totals[0])];
         let worse = |k: &usize| lost(self, *k, &solved).abs() > lost(self, *k, skin).abs() + HARM / 2.0;
-        let worse: Vec<usize> = suspects.into_iter().filter(worse).collect();
+        let is_torn = |&k: &usize| self.torn(k, &solved) > self.torn(k, skin) + TORN;
+        let worse: Vec<usize> = suspects.into_iter().filter(worse).chain(torn.into_iter().filter(is_torn)).collect();
         worse.iter().for_each(|&k| self.give_back(k, skin));
         self.undo_folds(skin, totals[0].min(totals[1])) || !worse.is_empty()
+    }
+
+    /// The share of a joint's free skin vertices with an edge of [`LONG`] times its length at rest.
+    fn torn(&self, k: usize, places: &[Vec3]) -> f64 {
+        let region = &*self.local.region;
+        let is_long =
+            |p: u32, (&n, length): (&u32, &f32)| places[p as usize].distance(places[n as usize]) > LONG * length;
+        let has_long = |p: u32| std::iter::zip(region.ring(p), region.ring_lengths(p)).any(|edge| is_long(p, edge));
+        let particles = self.local.free[k].iter().map(|member| member.particle);
+        let skin: Vec<u32> = particles.filter(|&p| p as usize >= self.local.nodes).collect();
+        skin.iter().filter(|&&p| has_long(p)).count() as f64 / skin.len().max(1) as f64
     }
 
     /// Gives back joints until no more than `most` pairs are left; returns whether any was.

@@ -12,8 +12,10 @@ use super::solver::{Frame, KEPT};
 
 /// Share of the body's volume that may be missing.
 const TOLERATED: f64 = 0.01;
-/// Most that is restored, as a share of the body's volume.
+/// Most that is restored, as a share of the body's volume and of the component's own: a finger's joint that is a ball by itself
+/// would else burst.
 const MOST: f64 = 0.05;
+const MOST_OF_OWN: f64 = 0.1;
 /// Bones that change a joint's volume by more than this scale the body, and its volume is not that of rest.
 const RIGID: f64 = 1e-3;
 
@@ -29,8 +31,8 @@ impl Frame<'_> {
         let missing = self.missing(skin);
         let all: f64 = missing.iter().map(|(_, whole)| whole.abs()).sum();
         for (island, &(missing, whole)) in missing.iter().enumerate() {
-            let tolerated = TOLERATED * whole.abs();
-            let excess = (missing - missing.clamp(-tolerated, tolerated)).clamp(-MOST * all, MOST * all);
+            let (tolerated, most) = (TOLERATED * whole.abs(), (MOST * all).min(MOST_OF_OWN * whole.abs()));
+            let excess = (missing - missing.clamp(-tolerated, tolerated)).clamp(-most, most);
             let members: Vec<Member> =
                 members.iter().filter(|m| self.island(m.particle) == Some(island)).copied().collect();
             if excess != 0.0 && !members.is_empty() {
