@@ -18,11 +18,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-import refine_character as rc
 import refine_picture
 import skinwright_native as native
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+
+sys.path.append(str(Path(__file__).resolve().parent.parent / "tests"))
+from support import posed, skin
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = Path(os.environ.get("SKINWRIGHT_DATA", ROOT.parent / "shared" / "data"))
@@ -60,12 +60,6 @@ def volume(positions, triangles) -> float:
     """Enclosed by a closed mesh."""
     a, b, c = (positions[triangles[:, k]].astype(float) for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
-
-
-def weld(positions, triangles):
-    """Triangles over first vertices of equal position, so that seams do not count."""
-    _, first, inverse = np.unique(positions, axis=0, return_index=True, return_inverse=True)
-    return first[inverse.ravel()][triangles]
 
 
 class InBlender:
@@ -154,7 +148,7 @@ def cylinder_table(lines: list[str], quick: bool) -> None:
         refiner, without = make(), {name: make(**{name: value}) for name, value in off.items()}
         for kind, axis, degrees in cases:
             pose = np.tile(np.eye(4), (2, 1, 1))
-            pose[1, :3, :3] = rc.about(np.array(axis, float), degrees)
+            pose[1, :3, :3] = posed.about(np.array(axis, float), degrees)
             shown = [
                 blender.posed(pose),
                 blender.posed(pose, preserve_volume=True),
@@ -181,30 +175,23 @@ def _figures(refiner, pose, positions, lost) -> str:
     return f"{lost:+.2%} / {figures['pairs']} / {bulge:.2f}"
 
 
-def character_refiner(character, **settings):
-    """The native object of a character."""
-    weights = native.Weights.from_dense(character.weights)
-    arrays = character.positions, character.triangles, weights, character.parents, character.segments
-    return native.Refiner(*arrays, **settings)
-
-
 def joints_table(lines: list[str]) -> None:
     """Knee and elbow over cell sizes; volume of a ball around the joint, as a share of what it holds at rest."""
-    character = rc.read(DATA / "mh_male/body.glb")
-    triangles = weld(character.positions, character.triangles)
+    character = posed.read(DATA / "mh_male/body.glb")
+    triangles = skin.weld(character.positions, character.triangles)
     rest, diagonal = volume(character.positions, triangles), np.linalg.norm(np.ptp(character.positions, axis=0))
     lines += ["", "## Joints of mh_male", "", "Volume of the region / pairs / bulge / inverted.", ""]
     lines += ["| joint | cell | limit | linear | live | bake |", "|---|---|---|---|---|---|"]
     for name, degrees, radius in (("calf_l", 120, 0.3), ("lowerarm_l", 60, 0.2), ("lowerarm_l", 90, 0.2)):
         joint = character.bones.index(name)
-        pose = rc.rotated(character, joint, _flexion(character, joint, degrees))
+        pose = posed.rotated(character, joint, _flexion(character, joint, degrees))
         points = np.random.default_rng(0).uniform(-radius, radius, (40000, 3))
         points = points[np.linalg.norm(points, axis=1) < radius] + character.segments[joint, 0]
-        inside = winding(character.positions.astype(float), triangles.astype(np.int64), points) > 0.5
+        inside = skin.winding(character.positions, triangles, points) > 0.5
         region = inside.mean() * 4 / 3 * np.pi * radius**3
         for cell in (0.8, 1.0, 1.25):
             for limit in (1.08, 1.10):
-                refiner = character_refiner(character, cell=0.015 * diagonal * cell, bind=limit)
+                refiner = skin.refiner_of(character, cell=0.015 * diagonal * cell, bind=limit)
                 cells = []
                 for quality in (None, "live", "bake"):
                     linear = native.linear_blend(
@@ -227,8 +214,8 @@ def _flexion(character, joint: int, degrees: float) -> np.ndarray:
     axis = np.cross(up, down)
     straight = np.linalg.norm(axis) < 0.05 * np.linalg.norm(up) * np.linalg.norm(down)
     axis = np.array([1.0, 0, 0]) if straight else axis
-    closer = rc.about(axis, 5) @ down @ up > down @ up
-    return rc.about(axis, degrees if closer else -degrees)
+    closer = posed.about(axis, 5) @ down @ up > down @ up
+    return posed.about(axis, degrees if closer else -degrees)
 
 
 def characters_table(lines: list[str], quick: bool) -> None:
@@ -239,11 +226,11 @@ def characters_table(lines: list[str], quick: bool) -> None:
     lines += ["| " + " | ".join(names) + " |", "|---" * len(names) + "|"]
     pictures = []
     for path in BODIES[:2] if quick else BODIES:
-        body = Body(rc.read(DATA / path))
-        poses = {name: rc.pose(body.character, conventions["poses"][name], conventions) for name in POSES}
+        body = Body(posed.read(DATA / path))
+        poses = {name: posed.pose(body.character, conventions["poses"][name], conventions) for name in POSES}
         for clip in (animation["name"] for animation in body.character.scene.get("animations", [])):
-            seconds = rc.length(body.character, clip)
-            poses |= {f"{clip} {s:.0%}": rc.clip(body.character, clip, s * seconds) for s in CLIP_SHARES}
+            seconds = posed.length(body.character, clip)
+            poses |= {f"{clip} {s:.0%}": posed.clip(body.character, clip, s * seconds) for s in CLIP_SHARES}
         for name, pose in poses.items():
             shown, cells = body.solved(pose)
             lines.append(f"| {path} | {name} | " + " | ".join(cells) + " |")
@@ -257,17 +244,16 @@ def characters_table(lines: list[str], quick: bool) -> None:
 class Body:
     """A character with what its figures need."""
 
-    def __init__(self, character: rc.Character) -> None:
+    def __init__(self, character: posed.Character) -> None:
         self.character = character
-        triangles = weld(character.positions, character.triangles).astype(np.uint32)
+        triangles = skin.weld(character.positions, character.triangles).astype(np.uint32)
         self.triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
-        self.pieces = pieces(self.triangles, len(character.positions))
+        self.pieces = skin.pieces(self.triangles, len(character.positions))
         self.at_rest = self._pairs(character.positions)
         self.step = np.ptp(character.positions, axis=0).max() / 150
         self.rest_volume = self._volume(character.positions)
-        sides = np.vstack([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        self.edges = np.unique(np.sort(sides, axis=1), axis=0)
-        self.weights, self.refiner = native.Weights.from_dense(character.weights), character_refiner(character)
+        self.edges = skin.edges(self.triangles)
+        self.weights, self.refiner = native.Weights.from_dense(character.weights), skin.refiner_of(character)
         arrays = character.positions, self.triangles, character.weights, character.parents, character.segments
         self.blender = InBlender(*arrays)
 
@@ -292,9 +278,7 @@ class Body:
         own = sum(self.pieces[self.triangles[a, 0]] == self.pieces[self.triangles[b, 0]] for a, b in new)
         between = f" + {len(new) - own}" if len(new) > own else ""
         lost = self._volume(positions) / self.rest_volume - 1
-        both = self.character.positions, positions
-        lengths = [np.linalg.norm(x[self.edges[:, 0]] - x[self.edges[:, 1]], axis=1) for x in both]
-        stretch = np.quantile(lengths[1] / np.maximum(lengths[0], 1e-9), 0.999)
+        stretch = skin.stretch(self.character.positions, positions, self.edges)
         return f"{own}{between} / {lost:+.1%} / {stretch:.2f}"
 
     def new_pairs(self, positions: np.ndarray) -> set[tuple[int, int]]:
@@ -305,37 +289,17 @@ class Body:
         return {(a, b) for a, b in native.intersecting_pairs(positions, self.triangles).tolist()}
 
     def _volume(self, positions: np.ndarray) -> float:
-        """Inside by the winding number, on a grid: what is enclosed twice counts once, and holes are closed."""
-        low, high = positions.min(0), positions.max(0)
-        axes = [np.arange(a - self.step, b + self.step, self.step) for a, b in zip(low, high, strict=True)]
-        points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-        inside = winding(positions.astype(float), self.triangles.astype(np.int64), points) > 0.5
-        return float(inside.sum() * self.step**3)
-
-
-def pieces(triangles: np.ndarray, n_vertices: int) -> np.ndarray:
-    """(V,) the connected component of each vertex."""
-    sides = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]]])
-    graph = coo_matrix((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), (n_vertices, n_vertices))
-    return connected_components(graph)[1]
-
-
-def winding(positions: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Generalised winding numbers (n,)."""
-    import igl
-
-    number = getattr(igl, "fast_winding_number", None) or igl.fast_winding_number_for_meshes
-    return number(positions, triangles, points)
+        return skin.volume(positions, self.triangles, self.step)
 
 
 def strips() -> None:
     """An elbow and a knee that bend, linear and refined, and how often they pass through themselves."""
-    body = Body(rc.read(DATA / "mh_male/body.glb"))
+    body = Body(posed.read(DATA / "mh_male/body.glb"))
     rows = []
     for name, most in (("lowerarm_l", 90), ("calf_l", 120)):
         joint = body.character.bones.index(name)
         turns = [_flexion(body.character, joint, degrees) for degrees in np.linspace(0, most, 7)[1:]]
-        poses = [rc.rotated(body.character, joint, turn) for turn in turns]
+        poses = [posed.rotated(body.character, joint, turn) for turn in turns]
         skew = turns[0] - turns[0].T
         axis = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
         outside = axis * np.sign(axis @ [body.character.segments[joint, 0, 0], 0, 0.3])

@@ -1,4 +1,4 @@
-"""Characters for the benchmark of refinement: meshes, weights and skeletons of .glb files, and poses on them."""
+"""Characters that are refined: meshes, weights and skeletons of .glb files, and poses on them."""
 
 import json
 import struct
