@@ -152,7 +152,7 @@ fn a_card_may_be_taken_from_either_side() {
 #[test]
 fn normals_of_the_source_are_shared_where_only_the_file_keeps_vertices_apart() {
     let ridge = relief(|y, _| -y.abs(), 1, 2.0, 2);
-    let whole = parts_with_bones(&[ridge.clone()]);
+    let whole = parts_with_bones(std::slice::from_ref(&ridge));
     let split = Fixture {
         positions: ridge.triangles.iter().flatten().map(|&i| ridge.positions[i as usize]).collect(),
         triangles: (0..ridge.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),

@@ -9,7 +9,7 @@ use skinwright_core::transfer::{Length, Settings, Transfer, transfer_weights};
 
 fn transfer(settings: &Settings) -> Transfer {
     let (fixture, rows) = body();
-    let source = source(&[fixture.clone()], 4, |_, p| {
+    let source = source(std::slice::from_ref(&fixture), 4, |_, p| {
         rows[fixture.positions.iter().position(|q| *q == p).expect("it is one of them")].clone()
     });
     transfer_weights(&source, target(&skirt()), None, settings).unwrap()
