@@ -44,6 +44,8 @@ BPY_.venv-5.3 := $(BPY_5.3)
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name '*.toml' -o -name '*.pyi')
 IN_TIME := timeout --kill-after=10
+# Cargo takes the processors that are there, whatever --jobs says.
+ON_ALL_CORES := env -u MAKEFLAGS
 PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest --hypothesis-seed=1
 # bpy 4.2 crashes at random after some hundred operators in one process, so there each file of such tests has its own.
 # The native module alone is tested with the same Python beside 4.5.
@@ -64,9 +66,6 @@ demo: .venv/native.stamp $(BODY)
 	@echo "Transferring, posing, rendering"
 	@$(IN_TIME) 600 .venv/bin/python blender_scripts/demo.py --body $(BODY) --out out
 
-# Cargo takes the processors that are there, whatever --jobs says.
-CARGO := env -u MAKEFLAGS cargo
-
 ## make test       the whole suite: Rust, then Python inside every Blender that this machine can have (5.3: FULL=1)
 test:
 	$(MAKE) --no-print-directory --jobs=2 test-rust blenders
@@ -78,7 +77,7 @@ blenders: $(addsuffix /tests.stamp,.venv $(OTHER_VENVS))
 # A suite that must pass asks the same every time; `make fuzz` asks something new.
 test-rust: export PROPTEST_RNG_SEED := 1
 test-rust: | cargo
-	$(CARGO) test --quiet
+	$(ON_ALL_CORES) cargo test --quiet
 
 test-python: blenders
 	mkdir -p out && cd out && MYPYPATH=../rust/native ../.venv/bin/python -m mypy.stubtest --concise skinwright_native \
@@ -105,9 +104,9 @@ check:
 
 lint: export RUSTDOCFLAGS := -D warnings
 lint: .venv/tests.stamp | cargo
-	$(CARGO) fmt --all --check
-	$(CARGO) clippy --quiet --workspace --all-targets -- -D warnings
-	$(CARGO) doc --quiet --workspace --no-deps
+	$(ON_ALL_CORES) cargo fmt --all --check
+	$(ON_ALL_CORES) cargo clippy --quiet --workspace --all-targets -- -D warnings
+	$(ON_ALL_CORES) cargo doc --quiet --workspace --no-deps
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
@@ -185,7 +184,7 @@ python:
 target/wheels/wheel.stamp: $(RUST_SOURCES) pyproject.toml .venv/blender.stamp | cargo
 	@echo "Building the native module (a few minutes the first time)"
 	@rm -f target/wheels/*.whl
-	@env -u MAKEFLAGS .venv/bin/maturin build --quiet --release --out target/wheels
+	@$(ON_ALL_CORES) .venv/bin/maturin build --quiet --release --out target/wheels
 	@touch $@
 
 %/native.stamp: target/wheels/wheel.stamp %/blender.stamp

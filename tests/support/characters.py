@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import struct
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -137,11 +135,9 @@ def gltf_character(path: Path) -> Character:
 
 
 def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
-    from support.glb import _accessor
+    from support.glb import contents
 
-    blob = path.read_bytes()
-    length = struct.unpack_from("<I", blob, 12)[0]
-    scene, binary = json.loads(blob[20 : 20 + length]), blob[20 + length + 8 :]
+    scene, accessor = contents(path)
     skin = scene["skins"][0]
     joints, nodes = skin["joints"], scene["nodes"]
     parent_of = {child: i for i, node in enumerate(nodes) for child in node.get("children", [])}
@@ -152,7 +148,7 @@ def _skeleton(path: Path) -> tuple[list[str], np.ndarray, np.ndarray]:
         while above >= 0 and above not in place:
             above = parent_of.get(above, -1)
         parents.append(place.get(above, -1))
-    inverse = _accessor(scene, binary, skin["inverseBindMatrices"]).astype(float).reshape(-1, 4, 4)
+    inverse = accessor(skin["inverseBindMatrices"]).astype(float).reshape(-1, 4, 4)
     names = [nodes[joint].get("name", f"joint{joint}") for joint in joints]
     return names, np.array(parents), np.linalg.inv(inverse.transpose(0, 2, 1))
 

@@ -3,11 +3,11 @@
 import json
 import os
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pytest
 import scipy.sparse as sp
 
 DTYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
@@ -26,6 +26,8 @@ class SkinnedMesh:
 
 def data_folder() -> Path:
     """The folder of real characters and garments; skips the test where there is none."""
+    import pytest  # benchmarks read files without it
+
     root = Path(__file__).resolve().parents[2]
     folder = Path(os.environ.get("SKINWRIGHT_DATA", root.parent / "shared" / "data"))
     if not (folder / "cases.json").is_file():
@@ -33,13 +35,17 @@ def data_folder() -> Path:
     return folder
 
 
-def read_meshes(path: Path) -> list[SkinnedMesh]:
-    """All meshes of a file in its own space (rest pose, metres)."""
+def contents(path: Path) -> tuple[dict, Callable[[int], np.ndarray]]:
+    """The scene of a file as JSON, and what reads an accessor by its number."""
     blob = path.read_bytes()
     length = struct.unpack_from("<I", blob, 12)[0]
-    scene = json.loads(blob[20 : 20 + length])
-    binary = blob[20 + length + 8 :]
-    accessor = lambda index: _accessor(scene, binary, index)  # noqa: E731
+    scene, binary = json.loads(blob[20 : 20 + length]), blob[20 + length + 8 :]
+    return scene, lambda index: _accessor(scene, binary, index)
+
+
+def read_meshes(path: Path) -> list[SkinnedMesh]:
+    """All meshes of a file in its own space (rest pose, metres)."""
+    scene, accessor = contents(path)
     nodes = [node for node in scene["nodes"] if "mesh" in node]
     return [_mesh(scene, accessor, node) for node in nodes]
 

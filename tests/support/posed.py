@@ -1,14 +1,13 @@
 """Characters that are refined: meshes, weights and skeletons of .glb files, and poses on them."""
 
-import json
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-_DTYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+from support.glb import contents
+
 # The names of a Rigify character's deform bones, by those of the shared poses.
 _RIGIFY = {
     "hips": "DEF-hips",
@@ -29,7 +28,6 @@ for _side in ("l", "r"):
         ("foot", "foot"),
     ):
         _RIGIFY[f"{_name}_{_side}"] = f"DEF-{_bone}.{_side.upper()}"
-_COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 @dataclass
@@ -49,10 +47,7 @@ class Character:
 
 def read(path: Path) -> Character:
     """All skinned meshes of a file as one; equal positions with equal weights stay apart, as in the file."""
-    blob = path.read_bytes()
-    length = struct.unpack_from("<I", blob, 12)[0]
-    scene, binary = json.loads(blob[20 : 20 + length]), blob[20 + length + 8 :]
-    accessor = lambda index: _accessor(scene, binary, index)  # noqa: E731
+    scene, accessor = contents(path)
     skinned = [node for node in scene["nodes"] if "mesh" in node and "skin" in node]
     skin = scene["skins"][skinned[0]["skin"]]
     positions, triangles, weights, start = [], [], [], 0
@@ -69,18 +64,6 @@ def read(path: Path) -> Character:
     segments = _segments(heads[:, :3, 3], parents)
     arrays = np.vstack(positions).astype(np.float32), np.vstack(triangles).astype(np.uint32), np.vstack(weights)
     return Character(path.stem, *arrays, bones, parents, segments, scene, accessor)
-
-
-def _accessor(scene: dict, binary: bytes, index: int) -> np.ndarray:
-    accessor = scene["accessors"][index]
-    view = scene["bufferViews"][accessor["bufferView"]]
-    dtype, columns = np.dtype(_DTYPES[accessor["componentType"]]), _COLUMNS[accessor["type"]]
-    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    stride = view.get("byteStride", columns * dtype.itemsize)
-    shape = (accessor["count"], columns * dtype.itemsize)
-    rows = np.lib.stride_tricks.as_strided(np.frombuffer(binary, np.uint8)[start:], shape, (stride, 1))
-    values = rows.copy().view(dtype).reshape(accessor["count"], columns)
-    return values / np.iinfo(dtype.name).max if accessor.get("normalized") else values
 
 
 def _weights(accessor, attributes: dict, vertices: int, bones: int) -> np.ndarray:

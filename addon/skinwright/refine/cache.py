@@ -59,10 +59,11 @@ def steps(
     if max(-first, last) > poses.LAST_FRAME:
         raise SceneError(f"frames {first} to {last} are too far out: Blender shows none beyond {poses.LAST_FRAME}")
     mesh_cache.check(obj)
-    poses.check_shown(characters.rig_of(obj))
+    rig = characters.rig_of(obj)
+    poses.check_shown(rig)
     files.check_output(path, overwrite=overwrite)
     character = characters.read(obj)
-    seen = Watched([obj, characters.rig_of(obj)])
+    seen = Watched([obj, rig])
     memory.expect(f"Refining {last - first + 1} frames of {obj.name}", _bytes(character, last - first + 1))
     matrices = list(_poses(obj, character, range(first, last + 1)))
     refiner = (yield Solving([lambda: character.refiner(params)]))[0]

@@ -15,6 +15,7 @@ const HARM: f64 = 0.1;
 const SMALL: f32 = 1.0;
 /// Share of a small joint's skin that may have edges of [`LONG`] times their length at rest, beyond what skinning stretches.
 const TORN: f64 = 0.05;
+/// Edges this many times as long as at rest count as torn.
 const LONG: f32 = 2.0;
 
 impl Frame<'_> {

@@ -45,7 +45,7 @@ pub(super) struct Surface {
 impl Surface {
     pub(super) fn new(mesh: &TriMesh<'_>) -> Self {
         let (of_vertex, source) = weld(mesh);
-        let rest = source.iter().map(|&i| Vec3::from(mesh.positions()[i as usize]).as_dvec3()).collect();
+        let rest: Vec<DVec3> = source.iter().map(|&i| Vec3::from(mesh.positions()[i as usize]).as_dvec3()).collect();
         let welded = mesh.triangles().iter().map(|t| t.map(|i| of_vertex[i as usize]));
         let mut triangles: Vec<_> = welded.filter(|[a, b, c]| a != b && b != c && c != a).collect();
         // Along the vertices' curve as well: boxes of neighbours are compared together.
@@ -55,38 +55,28 @@ impl Surface {
         let mut sets = DisjointSets::new(source.len());
         edges.iter().for_each(|&[i, j]| sets.union(i, j));
         let (island, islands) = sets.number(|i| starts[i as usize] < starts[i as usize + 1]);
-        let rims = rims(&triangles, source.len());
-        let (is_solid, is_mostly_solid) = (Vec::new(), false);
-        let mut surface = Self {
+        let of_skin = |vertex: u32| island[vertex as usize] as usize;
+        let mut rims = rims(&triangles, source.len());
+        let areas = areas(&triangles, &rims, islands, of_skin, |i| rest[i as usize]);
+        let is_solid: Vec<bool> = areas.iter().map(|[skin, open]| *open <= MOST_OPEN * skin).collect();
+        rims.retain(|rim| is_solid[of_skin(rim[0][0])]);
+        let solid: f64 =
+            areas.iter().zip(&is_solid).filter(|(_, is_solid)| **is_solid).map(|([skin, _], _)| skin).sum();
+        let is_mostly_solid = solid > areas.iter().map(|[skin, _]| skin).sum::<f64>() / 2.0;
+        Self {
             rest,
             of_vertex,
             source,
             triangles,
+            island,
+            islands,
             rims,
             is_solid,
             is_mostly_solid,
-            island,
-            islands,
             starts,
             neighbours,
             edges,
-        };
-        surface.find_solids();
-        surface
-    }
-
-    /// Tells the components that enclose a volume from sheets, which have openings as large as themselves.
-    fn find_solids(&mut self) {
-        let (mut skin, mut open) = (vec![0.0; self.islands], vec![0.0; self.islands]);
-        let island = |vertex: u32| self.island[vertex as usize] as usize;
-        let at = |i: u32| self.rest[i as usize];
-        self.triangles.iter().for_each(|t| skin[island(t[0])] += area(t.map(at)));
-        self.rims.iter().for_each(|rim| open[island(rim[0][0])] += fan(rim, at).map(area).sum::<f64>());
-        let is_solid: Vec<bool> = skin.iter().zip(&open).map(|(skin, open)| *open <= MOST_OPEN * skin).collect();
-        let solid: f64 = skin.iter().zip(&is_solid).filter(|(_, is_solid)| **is_solid).map(|(skin, _)| skin).sum();
-        self.is_mostly_solid = solid > skin.iter().sum::<f64>() / 2.0;
-        self.rims.retain(|rim| is_solid[self.island[rim[0][0] as usize] as usize]);
-        self.is_solid = is_solid;
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -130,6 +120,20 @@ fn weld(mesh: &TriMesh<'_>) -> (Vec<u32>, Vec<u32>) {
     order.iter().enumerate().for_each(|(n, &class)| number[class as usize] = n as u32);
     let of_vertex = weld.class_of().iter().map(|&class| number[class as usize]).collect();
     (of_vertex, order.iter().map(|&class| first[class as usize]).collect())
+}
+
+/// The area of each of `count` components, and of the fans that close its openings.
+fn areas(
+    triangles: &[[u32; 3]],
+    rims: &[Rim],
+    count: usize,
+    component: impl Fn(u32) -> usize,
+    at: impl Fn(u32) -> DVec3,
+) -> Vec<[f64; 2]> {
+    let mut areas = vec![[0.0; 2]; count];
+    triangles.iter().for_each(|t| areas[component(t[0])][0] += area(t.map(&at)));
+    rims.iter().for_each(|rim| areas[component(rim[0][0])][1] += fan(rim, &at).map(area).sum::<f64>());
+    areas
 }
 
 fn area([a, b, c]: [DVec3; 3]) -> f64 {

@@ -10,32 +10,32 @@ use super::crease::within;
 use super::joints::Member;
 use super::solver::{Frame, KEPT};
 
-/// Share of the body's volume that may be missing.
+/// Share of a component's volume that may be missing.
 const TOLERATED: f64 = 0.01;
-/// Most that is restored, as a share of the body's volume and of the component's own: a finger's joint that is a ball by itself
-/// would else burst.
+/// Most that is restored, as a share of the body's volume.
 const MOST: f64 = 0.05;
+/// And as a share of the component's own: a ball in a finger's joint would burst otherwise.
 const MOST_OF_OWN: f64 = 0.1;
 /// Bones that change a joint's volume by more than this scale the body, and its volume is not that of rest.
 const RIGID: f64 = 1e-3;
 
 impl Frame<'_> {
-    /// Restores what is missing of a closed body's volume beyond a tolerated share, at the joints that are no limbs. `skin`
+    /// Restores what is missing of the components' volumes beyond a tolerated share, at the joints that are no limbs. `skin`
     /// is where dual quaternions have the mesh' vertices (mesh units).
     pub(super) fn inflate_whole(&mut self, axes: &[Axis], pose: &[DAffine3], skin: &[[f32; 3]], parted: &[u32]) {
         let trunk: Vec<usize> = (0..self.active.len()).filter(|&k| !self.active[k].joint.is_limb).collect();
         if self.settings.volume == 0.0 || trunk.is_empty() || !self.has_whole(pose) {
             return;
         }
+        let excess = self.excess(skin);
+        if excess.iter().all(|&excess| excess == 0.0) {
+            return;
+        }
         let (members, kept) = (self.members(&trunk), self.kept(axes, parted));
-        let missing = self.missing(skin);
-        let all: f64 = missing.iter().map(|(_, whole)| whole.abs()).sum();
-        for (island, &(missing, whole)) in missing.iter().enumerate() {
-            let (tolerated, most) = (TOLERATED * whole.abs(), (MOST * all).min(MOST_OF_OWN * whole.abs()));
-            let excess = (missing - missing.clamp(-tolerated, tolerated)).clamp(-most, most);
-            let members: Vec<Member> =
-                members.iter().filter(|m| self.island(m.particle) == Some(island)).copied().collect();
-            if excess != 0.0 && !members.is_empty() {
+        for (island, &excess) in excess.iter().enumerate().filter(|&(_, &excess)| excess != 0.0) {
+            let is_here = |member: &&Member| self.island(member.particle) == Some(island);
+            let members: Vec<Member> = members.iter().filter(is_here).copied().collect();
+            if !members.is_empty() {
                 let balloon = Balloon::new(&self.local, &members, &kept);
                 self.inflate_by(&balloon, 6.0 * excess, axes, trunk[0]);
             }
@@ -65,7 +65,18 @@ impl Frame<'_> {
         self.prepared.surface.is_mostly_solid && (0..self.active.len()).all(is_rigid)
     }
 
-    /// The volume that each piece of the skin misses, in cells, and all of it at rest.
+    /// The volume that is to be restored to each component of the skin, in cells.
+    fn excess(&self, skin: &[[f32; 3]]) -> Vec<f64> {
+        let missing = self.missing(skin);
+        let all: f64 = missing.iter().map(|(_, whole)| whole.abs()).sum();
+        let excess = |&(missing, whole): &(f64, f64)| {
+            let (tolerated, most) = (TOLERATED * whole.abs(), (MOST * all).min(MOST_OF_OWN * whole.abs()));
+            (missing - missing.clamp(-tolerated, tolerated)).clamp(-most, most)
+        };
+        missing.iter().map(excess).collect()
+    }
+
+    /// The volume that each component of the skin misses, in cells, and all of it at rest.
     fn missing(&self, skin: &[[f32; 3]]) -> Vec<(f64, f64)> {
         let (prepared, surface) = (self.prepared, &self.prepared.surface);
         let in_cells = |&i: &u32| (Vec3::from(skin[i as usize]).as_dvec3() - prepared.middle) / prepared.cell;

@@ -25,6 +25,7 @@ pub(super) fn near(distance: f64, size: f64) -> f64 {
     (distance + EQUALLY_NEAR * size).powi(2)
 }
 
+/// Whether a point is within this squared distance.
 fn is_near(p: &Priced, near: f64) -> bool {
     p.point.distance * p.point.distance <= near
 }
@@ -37,10 +38,10 @@ pub(super) fn may_move(cost: f64, distance: f64, size: f64) -> bool {
 
 /// The least cost of the nearest points, and that of all if they are left for it: if others cost clearly less.
 pub(super) fn cheaper(found: &[Priced], distance: f64, size: f64) -> (f64, Option<f64>) {
-    let (mut least_near, mut least) = (f64::INFINITY, f64::INFINITY);
+    let (near, mut least_near, mut least) = (near(distance, size), f64::INFINITY, f64::INFINITY);
     for p in found {
         least = least.min(p.cost);
-        if is_near(p, near(distance, size)) {
+        if is_near(p, near) {
             least_near = least_near.min(p.cost);
         }
     }
@@ -55,9 +56,8 @@ pub(super) fn choose(source: &Source, found: &[Priced], distance: f64, size: f64
     }
     let (least_near, least) = cheaper(found, distance, size);
     let (moves, best) = (least.is_some(), least.unwrap_or(least_near));
-    let smallest = (EQUALLY_NEAR * size).powi(2);
-    let tied =
-        found.iter().filter(|p| (moves || is_near(p, near(distance, size))) && p.cost <= SLACK * best + smallest);
+    let (near, smallest) = (near(distance, size), (EQUALLY_NEAR * size).powi(2));
+    let tied = found.iter().filter(|p| (moves || is_near(p, near)) && p.cost <= SLACK * best + smallest);
     let weight =
         |p: &Priced| source.area(p.point.triangle) * (-(p.cost - best) / (2.0 * TIE * TIE * (best + smallest))).exp();
     let weighed: Vec<_> = tied.map(|p| (p.point, weight(p))).collect();
