@@ -344,15 +344,51 @@ fn priced_by_brute_force(mesh: &TriMesh<'_>, query: [f32; 3]) -> Vec<(u32, f64, 
 }
 
 #[test]
-fn cheapest_points_are_those_of_brute_force() {
-    let wave = |i: u32| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
-    let point = |i: u32| [wave(3 * i), wave(3 * i + 1), wave(3 * i + 2)];
-    let corner = |t: u32, k: u32| std::array::from_fn(|axis| point(t)[axis] + 0.1 * point(7919 * (3 * t + k))[axis]);
-    let positions: Vec<[f32; 3]> = (0..900).map(|i| corner(i / 3, i % 3)).collect();
-    let triangles: Vec<[u32; 3]> = (0..300).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+fn ties_within_a_tolerance_are_those_of_brute_force() {
+    let (positions, triangles) = scattered_triangles();
     let mesh = TriMesh::new(&positions, &triangles, "source").expect("a sound mesh");
     let index = SurfaceIndex::new(&mesh);
-    let mut queries: Vec<_> = (0..200).map(|i| point(31 * i + 5)).collect();
+    let queries: Vec<[f32; 3]> = (0..200).map(|i| wave_point(31 * i + 5)).collect();
+    let mut counts = [0, 0];
+    for tolerance in [1e-6, 1e-3, 0.02] {
+        let (closest, ties) = index.closest_points_and_ties(&queries, tolerance);
+        assert_eq!(closest, index.closest_points(&queries));
+        for (i, query) in queries.iter().enumerate() {
+            let all = priced_by_brute_force(&mesh, *query);
+            let least = closest[i].distance;
+            let within = |limit: f64| all.iter().filter(|&&(_, d, _)| d <= limit).count() as u32 - 1;
+            // The square of a little more than the least and the tolerance.
+            let more = (least * least * (1.0 + 1e-4) + tolerance * tolerance * (1.0 + 1e4)).sqrt();
+            assert!(
+                (within(least + tolerance)..=within(more)).contains(&ties[i]),
+                "query {i}, {tolerance}: {}",
+                ties[i]
+            );
+            counts[usize::from(ties[i] > 0)] += 1;
+        }
+    }
+    assert!(counts[0] > 50 && counts[1] > 50, "{counts:?}");
+}
+
+fn wave_point(i: u32) -> [f32; 3] {
+    let wave = |i: u32| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
+    [wave(3 * i), wave(3 * i + 1), wave(3 * i + 2)]
+}
+
+/// 300 small triangles in a box of side 2.
+fn scattered_triangles() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let corner =
+        |t: u32, k: u32| std::array::from_fn(|axis| wave_point(t)[axis] + 0.1 * wave_point(7919 * (3 * t + k))[axis]);
+    let positions = (0..900).map(|i| corner(i / 3, i % 3)).collect();
+    (positions, (0..300).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
+}
+
+#[test]
+fn cheapest_points_are_those_of_brute_force() {
+    let (positions, triangles) = scattered_triangles();
+    let mesh = TriMesh::new(&positions, &triangles, "source").expect("a sound mesh");
+    let index = SurfaceIndex::new(&mesh);
+    let mut queries: Vec<_> = (0..200).map(|i| wave_point(31 * i + 5)).collect();
     queries.push([f32::NAN, 0.0, 0.0]);
     let slack = 1.2;
     let bounds: Vec<_> =

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use crate::mesh::TriMesh;
 use bvh::Bvh;
 pub use cheapest::{Bound, Priced};
+use nearest::Reach;
 pub use oriented::{OrientedPoint, OrientedSurface};
 use search::Batch;
 
@@ -72,22 +73,22 @@ impl SurfaceIndex {
     ///
     /// Queries must be finite; the distance to one that is not is NaN or infinite.
     pub fn closest_points(&self, queries: &[[f32; 3]]) -> Vec<SurfacePoint> {
-        self.found(queries, |found| found.point)
+        self.found(queries, 0.0, |found| found.point)
     }
 
-    /// The same, and how many other triangles are as near, but for rounding errors; those that share the closest point are
-    /// among them.
-    pub fn closest_points_and_ties(&self, queries: &[[f32; 3]]) -> Vec<(SurfacePoint, u32)> {
-        self.found(queries, |found| (found.point, found.ties))
+    /// The same, and how many other triangles are as near, but for rounding errors, or no more than `tolerance` (world units)
+    /// farther away; those that share the closest point are among them, and some that are little farther away may be.
+    pub fn closest_points_and_ties(&self, queries: &[[f32; 3]], tolerance: f64) -> (Vec<SurfacePoint>, Vec<u32>) {
+        self.found(queries, tolerance, |found| (found.point, found.ties)).into_par_iter().unzip()
     }
 
-    fn found<T: Send>(&self, queries: &[[f32; 3]], take: impl Fn(Found) -> T + Sync) -> Vec<T> {
+    fn found<T: Send>(&self, queries: &[[f32; 3]], tolerance: f64, take: impl Fn(Found) -> T + Sync) -> Vec<T> {
         let order = morton::order(queries);
         let mut along_curve = vec![Found::default(); queries.len()];
         let batches = order.par_chunks(BATCH).zip(along_curve.par_chunks_mut(BATCH));
         batches.for_each(|(order, answers)| {
             let queries: Vec<_> = order.iter().map(|&i| queries[i as usize]).collect();
-            self.answer(&queries, answers);
+            self.answer(&queries, tolerance, answers);
         });
         let mut place = vec![0; queries.len()];
         order.iter().zip(0u32..).for_each(|(&i, along)| place[i as usize] = along);
@@ -97,7 +98,7 @@ impl SurfaceIndex {
     /// Exact closest point for one query, world space.
     pub fn closest_point(&self, query: [f32; 3]) -> SurfacePoint {
         let mut answer = [Found::default()];
-        self.answer(&[query], &mut answer);
+        self.answer(&[query], 0.0, &mut answer);
         answer[0].point
     }
 
@@ -129,8 +130,8 @@ impl SurfaceIndex {
         answers.into_iter().map(|answer| answer.expect("each query is on the curve once")).collect()
     }
 
-    fn answer(&self, queries: &[[f32; 3]], answers: &mut [Found]) {
-        Arch::new().dispatch(Batch { bvh: &self.bvh, queries, answers });
+    fn answer(&self, queries: &[[f32; 3]], tolerance: f64, answers: &mut [Found]) {
+        Arch::new().dispatch(Batch { bvh: &self.bvh, queries, reach: Reach::new(tolerance), answers });
     }
 }
 

@@ -13,11 +13,37 @@ use super::lanes::LANES;
 /// Queries looked at together: a register of f64.
 const GROUP: usize = 4;
 
-/// Triangles whose squared distances differ by less than this share are equally near.
+/// Squared distances that differ by less than this share are equal.
 const TIE: f64 = 1e-9;
+
+/// Makes of a triangle's squared distance the one up to which others are as near.
+#[derive(Clone, Copy)]
+pub(super) struct Reach {
+    factor: f64,
+    offset: f64,
+}
+
+impl Reach {
+    /// Of what is no more than `tolerance` farther away, and a little more: `(d + t)^2 <= (1 + s) d^2 + (1 + 1 / s) t^2`.
+    pub(super) fn new(tolerance: f64) -> Self {
+        let share = if tolerance > 0.0 { 1e-4 } else { TIE };
+        Self { factor: 1.0 + share, offset: (1.0 + 1.0 / share) * tolerance * tolerance }
+    }
+
+    #[inline(always)]
+    pub(super) fn of(&self, squared: f64) -> f64 {
+        squared * self.factor + self.offset
+    }
+
+    /// Numbers that make of an upper bound in f32 one within which are all that are as near, whatever is rounded.
+    pub(super) fn in_f32(&self) -> (f32, f32) {
+        if self.offset == 0.0 { (1.0, 0.0) } else { (self.factor as f32 + 1e-6, (1.01 * self.offset) as f32) }
+    }
+}
 
 /// The nearest triangle of each query so far.
 pub(super) struct Nearest {
+    reach: Reach,
     squared: [f64; LANES],
     /// How many others are equally near, by their distances when they were looked at.
     ties: [u64; LANES],
@@ -29,8 +55,9 @@ pub(super) struct Nearest {
 impl Nearest {
     /// Infinitely far.
     #[inline(always)]
-    pub(super) fn new(bvh: &Bvh) -> Self {
+    pub(super) fn new(bvh: &Bvh, reach: Reach) -> Self {
         Self {
+            reach,
             squared: [f64::INFINITY; LANES],
             ties: [0; LANES],
             barycentric: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
@@ -55,8 +82,8 @@ impl Nearest {
                     closest_to_origin([corners[0] - query, corners[1] - query, corners[2] - query]);
                 let best = self.squared[lane];
                 let nearer = (squared < best) | ((squared == best) & (triangle < self.triangle[lane]));
-                let ties = self.ties[lane] + u64::from(squared <= best * (1.0 + TIE));
-                self.ties[lane] = if squared < best * (1.0 - TIE) { 0 } else { ties };
+                let ties = self.ties[lane] + u64::from(squared <= self.reach.of(best));
+                self.ties[lane] = if self.reach.of(squared) < best { 0 } else { ties };
                 self.squared[lane] = if nearer { squared } else { best };
                 for k in 0..3 {
                     self.barycentric[k][lane] = if nearer { barycentric[k] } else { self.barycentric[k][lane] };

@@ -8,7 +8,7 @@ use pulp::{Simd, WithSimd};
 use super::Found;
 use super::bvh::Bvh;
 use super::lanes::{LANES, Lanes, Register};
-use super::nearest::Nearest;
+use super::nearest::{Nearest, Reach};
 use super::node::{LEAF, WIDTH};
 
 /// Candidates are looked at when there are so many, lest a million equal triangles fill the memory.
@@ -20,6 +20,8 @@ const MANY: usize = 1024;
 pub(super) struct Batch<'a> {
     pub(super) bvh: &'a Bvh,
     pub(super) queries: &'a [[f32; 3]],
+    /// What is as near as the nearest triangle.
+    pub(super) reach: Reach,
     pub(super) answers: &'a mut [Found],
 }
 
@@ -28,7 +30,7 @@ impl WithSimd for Batch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut search = Search { simd, bvh: self.bvh, stack: Vec::new(), candidates: Vec::new() };
+        let mut search = Search { simd, bvh: self.bvh, reach: self.reach, stack: Vec::new(), candidates: Vec::new() };
         let mut start = 0;
         for (queries, answers) in self.queries.chunks(LANES).zip(self.answers.chunks_mut(LANES)) {
             let nearest = search.nearest(queries, start);
@@ -43,6 +45,7 @@ impl WithSimd for Batch<'_> {
 struct Search<'a, S> {
     simd: S,
     bvh: &'a Bvh,
+    reach: Reach,
     stack: Vec<Visit>,
     candidates: Vec<Candidate>,
 }
@@ -75,7 +78,7 @@ struct Packet {
 impl Packet {
     /// Lanes without a finite query ask for nothing.
     #[inline(always)]
-    fn new(bvh: &Bvh, queries: &[[f32; 3]]) -> Self {
+    fn new(bvh: &Bvh, reach: Reach, queries: &[[f32; 3]]) -> Self {
         let (mut by_axis, mut limit) = ([Lanes([f32::NAN; LANES]); 3], Lanes([f32::NEG_INFINITY; LANES]));
         for (lane, query) in queries.iter().enumerate() {
             if query[0].is_finite() && query[1].is_finite() && query[2].is_finite() {
@@ -85,7 +88,7 @@ impl Packet {
                 }
             }
         }
-        Self { queries: by_axis, limit, leader: queries.len() / 2, nearest: Nearest::new(bvh) }
+        Self { queries: by_axis, limit, leader: queries.len() / 2, nearest: Nearest::new(bvh, reach) }
     }
 
     /// The queries for which something at this squared distance may be the nearest, as bits.
@@ -99,7 +102,7 @@ impl<S: Simd> Search<'_, S> {
     /// `start` is a leaf that is likely near; it does not change the answer.
     #[inline(always)]
     fn nearest(&mut self, queries: &[[f32; 3]], start: u32) -> Nearest {
-        let mut packet = Packet::new(self.bvh, queries);
+        let mut packet = Packet::new(self.bvh, self.reach, queries);
         self.visit_leaf(start, &mut packet);
         self.stack.push(Visit { at_least: Lanes::ZERO, child: self.bvh.root });
         while let Some(Visit { at_least, child }) = self.stack.pop() {
@@ -134,7 +137,7 @@ impl<S: Simd> Search<'_, S> {
     /// Lowers the limits to what the triangles of `leaf` allow, and collects those within them.
     #[inline(always)]
     fn visit_leaf(&mut self, leaf: u32, packet: &mut Packet) {
-        let simd = self.simd;
+        let (simd, (factor, offset)) = (self.simd, self.reach.in_f32());
         let first = leaf as usize * WIDTH;
         let triangles = &self.bvh.flat[first..self.bvh.flat.len().min(first + WIDTH)];
         let mut at_least = [Lanes::ZERO; WIDTH];
@@ -144,6 +147,7 @@ impl<S: Simd> Search<'_, S> {
                 let query = [Register::load(simd, x, k), Register::load(simd, y, k), Register::load(simd, z, k)];
                 let (low, high) = triangle.squared_distance_bounds(simd, query);
                 low.store(at_least, k);
+                let high = high * Register::splat(simd, factor) + Register::splat(simd, offset);
                 high.min(Register::load(simd, &packet.limit, k)).store(&mut packet.limit, k);
             }
         }
@@ -196,11 +200,11 @@ mod tests {
         let triangles: Vec<u32> = (0..2000).collect();
         let bvh = Bvh::new(&triangles, |t| [point(t), point(t) + 0.1 * point(t + 7), point(t) + 0.2 * point(t + 9)]);
         let queries: Vec<_> = (0..500).map(|i| (1.5 * point(31 * i)).to_array()).collect();
-        for count in [500, 1, 15, 17] {
+        for (count, reach) in [500, 1, 15, 17].into_iter().zip([0.0, 1e-3].map(Reach::new).into_iter().cycle()) {
             let mut answers = [vec![Found::default(); count], vec![Found::default(); count]];
             let [widest, scalar] = &mut answers;
-            pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries[..count], answers: widest });
-            Batch { bvh: &bvh, queries: &queries[..count], answers: scalar }.with_simd(pulp::Scalar::new());
+            pulp::Arch::new().dispatch(Batch { bvh: &bvh, queries: &queries[..count], reach, answers: widest });
+            Batch { bvh: &bvh, queries: &queries[..count], reach, answers: scalar }.with_simd(pulp::Scalar::new());
             assert_eq!(answers[0], answers[1]);
         }
     }

@@ -36,6 +36,15 @@ fn equally_near_places_share_a_vertex() {
 }
 
 #[test]
+fn equally_near_borders_share_a_vertex() {
+    // Beyond the rims of two walls; a rim has a triangle on one side only, so a tie is not the edge's other triangle.
+    let rims = parts_with_bones(&[wall(-1.0, 1, 1.9, 4), wall(1.0, -1, 1.9, 3)]);
+    let settings = Settings { max_normal_angle: PI, average_ties: true, ..within(3.0) };
+    let result = transfer(&rims, &level(1.2), &settings);
+    assert!((3..6).all(|i| is_row(&result.weights, i, &[0.5, 0.5])));
+}
+
+#[test]
 fn of_equally_near_places_those_whose_normals_agree_best_count() {
     let settings = Settings { max_normal_angle: PI, average_ties: true, ..within(3.0) };
     for (facing, bone) in [(1, 0), (-1, 1)] {

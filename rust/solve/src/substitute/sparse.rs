@@ -93,11 +93,11 @@ struct Found {
 }
 
 impl Found {
-    /// Memory for so many zeros.
-    fn zeroed(&mut self, len: usize) -> Vec<f32> {
+    /// Memory for so many numbers, empty.
+    fn memory(&mut self, len: usize) -> Vec<f32> {
         let mut memory = self.free.pop().unwrap_or_default();
         memory.clear();
-        memory.resize(len, 0.0);
+        memory.reserve(len);
         memory
     }
 }
@@ -150,13 +150,14 @@ impl Backward<'_> {
             return;
         }
         let width = active.width;
-        let mut own = found.zeroed(front.columns * width);
+        let len = front.columns * width;
+        let mut own = found.memory(len);
         let (done, stored) = (self.active[index], self.places[index]);
         let halfway = self.halfway[self.starts[index]..].chunks(stored.width.max(1));
         if stored.mask == active.mask {
-            let len = own.len();
-            own.copy_from_slice(&self.halfway[self.starts[index]..][..len]);
+            own.extend_from_slice(&self.halfway[self.starts[index]..][..len]);
         } else {
+            own.resize(len, 0.0);
             let (from, to) = (stored.slots(&done), active.slots(&done));
             for (row, halfway) in own.chunks_exact_mut(width).zip(halfway) {
                 from.iter().zip(&*to).for_each(|(&from, &to)| row[to] = halfway[from]);
@@ -229,18 +230,20 @@ impl Backward<'_> {
     /// The solution in the rows under the columns of `child`, (rows padded to whole blocks, width).
     fn boundary(&self, child: usize, active: Active, parent: &Solved, found: &mut Found) -> Vec<f32> {
         let count = self.tree.fronts[child].rows.len().next_multiple_of(BLOCK);
-        let mut boundary = found.zeroed(count * active.width);
+        let mut boundary = found.memory(count * active.width);
         if active.mask == 0 {
             return boundary;
         }
-        let slots = parent.active.slots(&active);
-        for (target, row) in boundary.chunks_exact_mut(active.width).zip(self.rows_under(child, parent)) {
+        let (slots, padding) = (parent.active.slots(&active), [0.0; LINE]);
+        for row in self.rows_under(child, parent) {
             if active.mask == parent.active.mask {
-                target.copy_from_slice(row);
+                boundary.extend_from_slice(row);
             } else {
-                target.iter_mut().zip(&*slots).for_each(|(target, &slot)| *target = row[slot]);
+                boundary.extend(slots.iter().map(|&slot| row[slot]));
+                boundary.extend_from_slice(&padding[..active.width - slots.len()]);
             }
         }
+        boundary.resize(count * active.width, 0.0);
         boundary
     }
 }

@@ -46,8 +46,9 @@ impl Candidates {
 
     /// The `first` point of each vertex (V), and for those that have more than one, all of them with their shares (V lists,
     /// empty for the others).
-    pub fn several(first: Vec<SurfacePoint>, all: &[Vec<(SurfacePoint, f64)>]) -> Self {
-        let mut several = Several { starts: vec![0], points: Vec::new() };
+    pub fn several<'a>(first: Vec<SurfacePoint>, all: impl Iterator<Item = &'a [(SurfacePoint, f64)]>) -> Self {
+        let mut several = Several { starts: Vec::with_capacity(first.len() + 1), points: Vec::new() };
+        several.starts.push(0);
         for points in all {
             several.points.extend(points);
             several.starts.push(several.points.len() as u32);

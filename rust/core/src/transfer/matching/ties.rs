@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use super::{Candidates, TargetSurface};
+use crate::adjacency::VertexTriangles;
 use crate::surface::{Bound, Priced, SurfacePoint};
 use crate::transfer::Source;
 
@@ -22,15 +23,14 @@ const ZERO: f64 = 1e-9;
 
 /// The closest points of all vertices.
 pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> Candidates {
-    let found = source.index().closest_points_and_ties(target.positions);
+    let (mut first, ties) = source.index().closest_points_and_ties(target.positions, 0.0);
     let around = triangles_around(source);
     let on_surface = ON_SURFACE * source.size();
     let is_open = |&i: &u32| {
-        let (point, ties) = &found[i as usize];
-        *ties > 0 && point.distance > on_surface && *ties != sharing(source, &around, point)
+        let (point, ties) = (&first[i as usize], ties[i as usize]);
+        ties > 0 && point.distance > on_surface && ties != sharing(source, &around, point)
     };
-    let open: Vec<u32> = (0..found.len() as u32).into_par_iter().with_min_len(1024).filter(is_open).collect();
-    let mut first: Vec<SurfacePoint> = found.into_iter().map(|(point, _)| point).collect();
+    let open: Vec<u32> = (0..first.len() as u32).into_par_iter().with_min_len(1024).filter(is_open).collect();
     if open.is_empty() {
         return Candidates::one_each(first);
     }
@@ -42,27 +42,29 @@ pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> Candidates {
             several[i as usize] = places;
         }
     }
-    Candidates::several(first, &several)
+    Candidates::several(first, several.iter().map(Vec::as_slice))
 }
 
-/// How many triangles there are around each vertex of the source.
-fn triangles_around(source: &Source) -> Vec<u32> {
+/// The source's triangles around each of its vertices.
+pub(super) fn triangles_around(source: &Source) -> VertexTriangles {
     let count = source.triangles().iter().flatten().max().map_or(0, |&most| most as usize + 1);
-    let mut around = vec![0; count];
-    source.triangles().iter().flatten().for_each(|&i| around[i as usize] += 1);
-    around
+    VertexTriangles::new(source.triangles(), count)
 }
 
-/// How many other triangles share the point, in a surface without borders and fins.
-fn sharing(source: &Source, around: &[u32], point: &SurfacePoint) -> u32 {
+/// How many other triangles share a point on the source, as they share its corner or edge.
+pub(super) fn sharing(source: &Source, around: &VertexTriangles, point: &SurfacePoint) -> u32 {
     let corners = source.triangles()[point.triangle as usize];
-    let inside: Vec<u32> =
-        std::iter::zip(corners, point.barycentric).filter(|&(_, share)| share > ZERO).map(|(i, _)| i).collect();
-    match inside[..] {
-        [i] => around[i as usize] - 1,
-        [_, _] => 1,
-        _ => 0,
-    }
+    let is_there = |&k: &usize| point.barycentric[k] > ZERO;
+    let mut inside = (0..3).filter(is_there).map(|k| corners[k]);
+    let with = |i: u32, j: u32| {
+        around.around(i as usize).iter().filter(|&&t| source.triangles()[t as usize].contains(&j)).count()
+    };
+    let all = match (inside.next(), inside.next(), inside.next()) {
+        (Some(i), Some(j), None) => with(i, j),
+        (Some(i), None, None) => with(i, i),
+        _ => 1,
+    };
+    all as u32 - 1
 }
 
 /// The places that each vertex of `open` takes its row from, with shares; one at least.

@@ -60,12 +60,10 @@ pub(super) fn confidence(length: f64, size: f64) -> f32 {
 
 /// The closest point of each vertex, and what it takes its row from instead.
 pub(super) fn find(source: &Source, target: TargetSurface<'_>) -> (Candidates, Trust) {
-    let closest = source.index().closest_points(target.positions);
-    let choices = search::choices(source, target, &closest);
-    let gap: Vec<f64> = choices.iter().map(|choice| choice.gap).collect();
-    let cosine = choices.iter().map(|choice| choice.cosine).collect();
-    let all: Vec<_> = choices.into_iter().map(|choice| choice.points).collect();
-    (Candidates::several(closest, &all), Trust { gap, cosine })
+    let (closest, ties) = source.index().closest_points_and_ties(target.positions, EQUALLY_NEAR * source.size());
+    let choices = search::choices(source, target, &closest, &ties);
+    let (gap, cosine) = choices.par_iter().with_min_len(1024).map(|choice| (choice.gap, choice.cosine)).unzip();
+    (Candidates::several(closest, choices.iter().map(|choice| &choice.points[..])), Trust { gap, cosine })
 }
 
 /// Gap and tilt as one length, which softness multiplies. Normals that point the opposite way are those of linings, and no tilt.

@@ -10,17 +10,25 @@ use crate::adjacency::VertexTriangles;
 use crate::surface::{Bound, Priced, SurfacePoint};
 use crate::transfer::Source;
 use crate::transfer::matching::TargetSurface;
+use crate::transfer::matching::ties::{sharing, triangles_around};
 use crate::transfer::matching::upright::{self, Side};
 
 /// Normals agree, or are opposite, from this cosine on.
 const CLEARLY: f64 = 0.5;
 
-/// What each vertex (V) takes its row from; `closest` (V) are the points nearest in position alone.
-pub(super) fn choices(source: &Source, target: TargetSurface<'_>, closest: &[SurfacePoint]) -> Vec<Choice> {
+/// What each vertex (V) takes its row from; `closest` (V) are the points nearest in position alone, and `ties` (V) how
+/// many other triangles are equally near.
+pub(super) fn choices(
+    source: &Source,
+    target: TargetSurface<'_>,
+    closest: &[SurfacePoint],
+    ties: &[u32],
+) -> Vec<Choice> {
     let around = VertexTriangles::new(target.triangles, target.positions.len());
     let sides = target.triangles.par_iter().with_min_len(1024).map(|t| side(&target, t)).collect();
+    let corners = triangles_around(source);
     let size = source.size();
-    let search = Search { source, target, closest, around, sides, size };
+    let search = Search { source, target, closest, ties, corners, around, sides, size };
     let all: Vec<u32> = (0..closest.len() as u32).collect();
     let mut choices = search.choices(&all, false);
     let lining = search.lining(&choices);
@@ -35,6 +43,9 @@ struct Search<'a> {
     source: &'a Source,
     target: TargetSurface<'a>,
     closest: &'a [SurfacePoint],
+    ties: &'a [u32],
+    /// The source's triangles around each of its vertices.
+    corners: VertexTriangles,
     /// The triangles around each vertex of the target, and their normals.
     around: VertexTriangles,
     sides: Vec<Option<Vec3>>,
@@ -44,35 +55,48 @@ struct Search<'a> {
 impl Search<'_> {
     /// The points of these vertices; with `both_ways` either direction of their normals will do.
     fn choices(&self, vertices: &[u32], both_ways: bool) -> Vec<Choice> {
-        // Most find nothing clearly cheaper; only for those that do, all is searched for that costs nearly as little.
-        let bounds = vertices.par_iter().with_min_len(1024).map(|&i| self.bound(i as usize, both_ways)).collect();
-        let decide = |i: usize, found: &[Priced]| match self.cheaper(i, found) {
+        let mut decided: Vec<Result<Choice, Bound>> =
+            vertices.par_iter().with_min_len(1024).map(|&i| self.only_choice(i as usize, both_ways)).collect();
+        // Few find something clearly cheaper; only for those, all is searched for that costs nearly as little.
+        self.decide(vertices, &mut decided, 1.0, both_ways, |i, found| match self.cheaper(i, found) {
             None => Ok(self.choice(i, found)),
             Some(least) => Err(Bound { near: near(self.closest[i].distance, self.size), cost: SLACK * least }),
-        };
-        let mut decided = self.cheapest(vertices, bounds, 1.0, both_ways, decide);
-        let moving =
-            decided.iter().enumerate().filter_map(|(k, choice)| choice.as_ref().err().map(|&bound| (k, bound)));
-        let (moving, bounds): (Vec<usize>, Vec<Bound>) = moving.unzip();
-        let again: Vec<u32> = moving.iter().map(|&k| vertices[k]).collect();
-        let moved = self.cheapest(&again, bounds, SLACK, both_ways, |i, found| self.choice(i, found));
-        std::iter::zip(moving, moved).for_each(|(k, choice)| decided[k] = Ok(choice));
-        decided.into_iter().map(|choice| choice.unwrap_or_else(|_| unreachable!("it was searched for again"))).collect()
+        });
+        self.decide(vertices, &mut decided, SLACK, both_ways, |i, found| Ok(self.choice(i, found)));
+        decided
+            .into_iter()
+            .map(|choice| choice.unwrap_or_else(|_| unreachable!("all have been searched for")))
+            .collect()
     }
 
-    /// What `finish` makes of the cheapest points of these vertices, which it is told.
-    fn cheapest<T: Send>(
+    /// The closest point if there is no other to choose; where to search if there may be.
+    fn only_choice(&self, i: usize, both_ways: bool) -> Result<Choice, Bound> {
+        let bound = self.bound(i, both_ways);
+        if bound.cost > 0.0 || self.ties[i] != sharing(self.source, &self.corners, &self.closest[i]) {
+            return Err(bound);
+        }
+        let closest = &self.closest[i];
+        Ok(Choice { points: Vec::new(), gap: closest.distance, cosine: self.agreement(i, closest) })
+    }
+
+    /// Replaces each bound by what `finish` makes of the points that are cheapest within it, for one of these vertices.
+    fn decide(
         &self,
         vertices: &[u32],
-        bounds: Vec<Bound>,
+        decided: &mut [Result<Choice, Bound>],
         slack: f64,
         both_ways: bool,
-        finish: impl Fn(usize, &[Priced]) -> T + Sync,
-    ) -> Vec<T> {
-        let at = |k: usize| vertices[k] as usize;
-        let queries: Vec<[f32; 3]> = vertices.iter().map(|&i| self.target.positions[i as usize]).collect();
+        finish: impl Fn(usize, &[Priced]) -> Result<Choice, Bound> + Sync,
+    ) {
+        let open =
+            std::iter::zip(0.., &*decided).filter_map(|(k, choice)| choice.as_ref().err().map(|&bound| (k, bound)));
+        let (open, bounds): (Vec<usize>, Vec<Bound>) = open.unzip();
+        let at = |k: usize| vertices[open[k]] as usize;
+        let queries: Vec<[f32; 3]> = (0..open.len()).map(|k| self.target.positions[at(k)]).collect();
         let cost = |k: usize, point: &SurfacePoint| self.cost(at(k), point, both_ways);
-        self.source.index().cheapest_points(&queries, &bounds, slack, cost, |k, found| finish(at(k), found))
+        let index = self.source.index();
+        let found = index.cheapest_points(&queries, &bounds, slack, cost, |k, found| finish(at(k), found));
+        std::iter::zip(&open, found).for_each(|(&k, choice)| decided[k] = choice);
     }
 
     fn cost(&self, i: usize, point: &SurfacePoint, both_ways: bool) -> f64 {
