@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use glam::Vec3;
 
-use super::pairs::{Cleared, Slabs, intersecting_pairs, intersecting_pairs_of};
+use super::pairs::{Slabs, Suspects, intersecting_pairs, intersecting_pairs_of};
 use super::region::Region;
 use super::surface::Surface;
 
@@ -31,20 +31,6 @@ const RINGS: usize = 10;
 #[derive(Debug, Default)]
 pub(super) struct Contact {
     at_rest: HashSet<[u32; 2]>,
-}
-
-/// Triangles among which folds are looked for, and which of them are known to be clear of each other.
-#[derive(Clone, Copy)]
-pub(super) struct Suspects<'a> {
-    pub(super) triangles: &'a [u32],
-    pub(super) cleared: &'a Cleared<'a>,
-}
-
-impl<'a> Suspects<'a> {
-    /// Of these triangles nothing is known.
-    fn all_of(triangles: &'a [u32]) -> Self {
-        Self { triangles, cleared: &|_| false }
-    }
 }
 
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
@@ -109,7 +95,7 @@ impl Contact {
 
     /// Pairs of one piece among all triangles of the skin that do not intersect at rest.
     pub(super) fn all_own_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
-        let all: Vec<u32> = (0..skin.triangles().len() as u32).collect();
+        let all = by_island(skin, (0..skin.triangles().len() as u32).collect());
         self.own_pairs(skin, places, Suspects::all_of(&all), slabs)
     }
 
@@ -122,17 +108,31 @@ impl Contact {
         among: Suspects<'_>,
         slabs: &Slabs,
     ) -> Vec<[u32; 2]> {
-        let mut pairs = self.pairs(skin, places, among, slabs);
-        pairs.retain(|&[a, b]| skin.island(a) == skin.island(b));
-        pairs
-    }
-
-    fn pairs(&self, skin: &dyn Skin, places: &[Vec3], among: Suspects<'_>, slabs: &Slabs) -> Vec<[u32; 2]> {
-        let mut pairs = intersecting_pairs_of(places, skin.triangles(), among.triangles, among.cleared, slabs);
+        let island = |t: u32| skin.island(t);
+        let of_one_piece = Suspects { pieces: Some(&island), ..among };
+        let mut pairs = intersecting_pairs_of(places, skin.triangles(), of_one_piece, slabs);
         pairs.retain(|&[a, b]| {
             let [a, b] = [skin.name(a), skin.name(b)];
             !self.at_rest.contains(&[a.min(b), a.max(b)])
         });
+        pairs
+    }
+
+    /// The same pairs after some vertices have `moved`, among triangles that had the pairs `before`.
+    pub(super) fn own_pairs_again(
+        &self,
+        skin: &dyn Skin,
+        places: &[Vec3],
+        among: &[u32],
+        (before, moved): (Vec<[u32; 2]>, &[u32]),
+        slabs: &Slabs,
+    ) -> Vec<[u32; 2]> {
+        let mut has_moved = vec![false; places.len()];
+        moved.iter().for_each(|&i| has_moved[i as usize] = true);
+        let is_still = |t: u32| skin.triangles()[t as usize].iter().all(|&i| !has_moved[i as usize]);
+        let mut pairs = self.own_pairs(skin, places, Suspects { cleared: &is_still, ..Suspects::all_of(among) }, slabs);
+        pairs.extend(before.into_iter().filter(|pair| pair.iter().all(|&t| is_still(t))));
+        pairs.sort_unstable();
         pairs
     }
 
@@ -149,6 +149,8 @@ impl Contact {
         farthest: f32,
         slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
+        let triangles = by_island(skin, suspects.triangles.to_vec());
+        let suspects = Suspects { triangles: &triangles, ..suspects };
         let (mut pairs, mut moved) = (self.own_pairs(skin, places, suspects, slabs), Vec::new());
         for _ in 0..CHECKS {
             if pairs.is_empty() {
@@ -181,25 +183,27 @@ impl Contact {
     ) -> (Vec<u32>, Vec<[u32; 2]>) {
         let around = grown(skin, corners(skin, &pairs), RINGS);
         let near: HashSet<u32> = around.iter().copied().collect();
-        let among: Vec<u32> = (0..skin.triangles().len() as u32)
-            .filter(|&t| skin.triangles()[t as usize].iter().any(|i| near.contains(i)))
-            .collect();
+        let is_near = |&t: &u32| skin.triangles()[t as usize].iter().any(|i| near.contains(i));
+        let among = by_island(skin, (0..skin.triangles().len() as u32).filter(is_near).collect());
         let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().max(1.0) as usize;
         let (start, mut moved) = (places.clone(), Vec::new());
+        let mut known = self.own_pairs(skin, places, Suspects::all_of(&among), slabs);
         for (rings, step) in TRIES.into_iter().filter(|&(rings, _)| rings <= most_rings) {
-            let (mut now, mut left, mut stalled) = (places.clone(), pairs.clone(), 0);
+            let (mut now, mut left, mut all, mut stalled) = (places.clone(), pairs.clone(), known.clone(), 0);
             while stalled < STALLED && !pairs.is_empty() {
                 let pushed = push(skin, &mut now, &left, rings, step);
                 for &i in &pushed {
                     let from = start[i as usize];
                     now[i as usize] = from + (now[i as usize] - from).clamp_length_max(farthest);
                 }
+                all = self.own_pairs_again(skin, &now, &among, (all, &pushed), slabs);
                 moved.extend(pushed);
-                left = self.own_pairs(skin, &now, Suspects::all_of(&among), slabs);
+                left.clone_from(&all);
                 stalled += 1;
                 if left.len() < pairs.len() {
                     stalled = 0;
                     pairs.clone_from(&left);
+                    known.clone_from(&left);
                     places.clone_from(&now);
                 }
                 if left.is_empty() {
@@ -209,6 +213,12 @@ impl Contact {
         }
         (moved, pairs)
     }
+}
+
+/// These triangles, those of an island one after the other.
+fn by_island(skin: &dyn Skin, mut triangles: Vec<u32>) -> Vec<u32> {
+    triangles.sort_by_key(|&t| skin.island(t));
+    triangles
 }
 
 /// The vertices of these pairs, ascending.

@@ -4,9 +4,9 @@ use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
-use super::contact::Suspects;
 use super::crease::within;
 use super::membrane::Membrane;
+use super::pairs::Suspects;
 use super::prepared::TETRAHEDRON;
 use super::projection::untangle;
 use super::settings::Quality;
@@ -91,7 +91,7 @@ impl Frame<'_> {
         let (mut places, region) = (self.places(), &*self.local.region);
         let stays: Vec<bool> = cleared.iter().zip(&places).map(|(a, b)| (a - b).abs().max_element() < STILL).collect();
         let is_cleared = |t: u32| !stays.is_empty() && region.triangles[t as usize].iter().all(|&p| stays[p as usize]);
-        let among = Suspects { triangles: suspects, cleared: &is_cleared };
+        let among = Suspects { cleared: &is_cleared, ..Suspects::all_of(suspects) };
         let (moved, left) = self.prepared.contact.part(region, &mut places, among, FARTHEST, &self.slabs);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];

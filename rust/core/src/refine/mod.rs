@@ -42,8 +42,8 @@ mod whole;
 
 use glam::{DAffine3, Vec3};
 
-use self::contact::Suspects;
 use self::pairs::Slabs;
+use self::pairs::Suspects;
 pub use self::pairs::intersecting_pairs;
 use self::prepared::Prepared;
 pub use self::projection::Kernel;
@@ -205,7 +205,7 @@ impl Refiner {
         let surface = &self.prepared.surface;
         let mut places: Vec<Vec3> = surface.source.iter().map(|&i| positions[i as usize].into()).collect();
         let triangles: Vec<u32> = (0..surface.triangles.len() as u32).collect();
-        let suspects = Suspects { triangles: &triangles, cleared: &|_| false };
+        let suspects = Suspects::all_of(&triangles);
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
         let before = places.clone();
         if self.prepared.contact.part(surface, &mut places, suspects, farthest, slabs).0.is_empty() {

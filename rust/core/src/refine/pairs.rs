@@ -23,7 +23,7 @@ pub fn intersecting_pairs(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec
     let scale = STEPS / (high - low).max_element().max(f32::MIN_POSITIVE);
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     order.sort_by_cached_key(|&t| (morton(((centre(&triangles[t as usize]) - low) * scale).as_ivec3().to_array()), t));
-    intersecting_pairs_of(&places, triangles, &order, &|_| false, &Slabs::new([]))
+    intersecting_pairs_of(&places, triangles, Suspects::all_of(&order), &Slabs::new([]))
 }
 
 /// Directions across which triangles are bounded: the axes, and planes that skin is pressed against. It fills boxes that lie
@@ -41,9 +41,11 @@ impl Slabs {
     }
 }
 
-/// Triangles' extents along each direction of [`Slabs`], by eights, and those of eights by eights again.
-struct Tree<'a> {
-    slabs: &'a Slabs,
+/// Triangles' extents along each direction of [`Slabs`], by eights, and those of eights by eights again. Pieces are a
+/// direction too, the first.
+struct Tree {
+    /// How many directions there are.
+    directions: usize,
     /// Of each triangle.
     extents: Vec<Extents>,
     /// Of each leaf of eight.
@@ -56,7 +58,7 @@ struct Tree<'a> {
 struct Eight([[Vec4; 2]; 2]);
 
 /// An extent along each direction.
-type Extents = [[f32; 2]; 3 + Slabs::MOST];
+type Extents = [[f32; 2]; 4 + Slabs::MOST];
 const NOWHERE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 impl Eight {
@@ -74,26 +76,29 @@ impl Eight {
     }
 }
 
-impl<'a> Tree<'a> {
-    fn new(slabs: &'a Slabs, places: &[Vec3], triangles: &[[u32; 3]], among: &[u32]) -> Self {
-        let of_one = |&t: &u32| extents(slabs, triangles[t as usize].map(|i| places[i as usize]));
+impl Tree {
+    fn new(slabs: &Slabs, places: &[Vec3], triangles: &[[u32; 3]], among: &[u32], pieces: Option<&Pieces<'_>>) -> Self {
+        let directions = slabs.0.len() + usize::from(pieces.is_some());
+        let of_one = |&t: &u32| {
+            let corners = triangles[t as usize].map(|i| places[i as usize]);
+            extents(slabs, corners, pieces.map(|piece| piece(t)))
+        };
         let extents: Vec<Extents> = among.par_iter().with_min_len(RUN * WIDE).map(of_one).collect();
         let leaves: Vec<Extents> = extents.chunks(WIDE).map(joined).collect();
-        let mut levels = vec![by_eights(&extents, slabs.0.len())];
+        let mut levels = vec![by_eights(&extents, directions)];
         let mut groups = leaves.clone();
         while groups.len() > 1 {
-            levels.push(by_eights(&groups, slabs.0.len()));
+            levels.push(by_eights(&groups, directions));
             groups = groups.chunks(WIDE).map(joined).collect();
         }
-        Self { slabs, extents, leaves, levels }
+        Self { directions, extents, leaves, levels }
     }
 
     /// A bit for each child of a node that overlaps `extents`.
     fn overlapping(&self, level: usize, node: usize, extents: &Extents) -> u32 {
-        let count = self.slabs.0.len();
-        let directions = self.levels[level][node * count..(node + 1) * count].iter().zip(extents);
+        let of_node = &self.levels[level][node * self.directions..(node + 1) * self.directions];
         let mut bits = 0xff;
-        for (direction, &extent) in directions {
+        for (direction, &extent) in of_node.iter().zip(extents) {
             bits &= direction.overlapping(extent);
             if bits == 0 {
                 break;
@@ -119,28 +124,46 @@ fn joined(group: &[Extents]) -> Extents {
     all
 }
 
-fn extents(slabs: &Slabs, corners: [Vec3; 3]) -> Extents {
+fn extents(slabs: &Slabs, corners: [Vec3; 3], piece: Option<u32>) -> Extents {
     // What rounding may change: no pair that intersects may be lost.
     let largest = corners.map(Vec3::abs).iter().fold(Vec3::ZERO, |most, &p| most.max(p));
     let pad = ROUNDING * largest.element_sum();
-    let mut extents = [NOWHERE; 3 + Slabs::MOST];
-    for (extent, direction) in extents.iter_mut().zip(&slabs.0) {
+    let mut extents = [NOWHERE; 4 + Slabs::MOST];
+    let (of_piece, of_slabs) = extents.split_at_mut(usize::from(piece.is_some()));
+    of_piece.fill([piece.unwrap_or(0) as f32; 2]);
+    for (extent, direction) in of_slabs.iter_mut().zip(&slabs.0) {
         let [a, b, c] = corners.map(|p| p.dot(*direction));
         *extent = [a.min(b).min(c) - pad, a.max(b).max(c) + pad];
     }
     extents
 }
 
-/// Triangles of which no two intersect, as is known already.
-pub(super) type Cleared<'a> = dyn Fn(u32) -> bool + Sync + 'a;
+/// Triangles among which pairs are looked for; fast where neighbours in the list lie near each other.
+#[derive(Clone, Copy)]
+pub(super) struct Suspects<'a> {
+    pub(super) triangles: &'a [u32],
+    /// Which of them are known to be clear of each other: pairs of two are not looked for.
+    pub(super) cleared: &'a (dyn Fn(u32) -> bool + Sync),
+    /// Which piece of the skin each belongs to, if pairs of different pieces are not looked for either; fast where those of a
+    /// piece follow each other.
+    pub(super) pieces: Option<&'a Pieces<'a>>,
+}
 
-/// The same among some triangles, which are fast to compare where neighbours in the list lie near each other. Pairs of two
-/// `cleared` ones are not looked for.
+impl<'a> Suspects<'a> {
+    /// Of these triangles nothing is known.
+    pub(super) fn all_of(triangles: &'a [u32]) -> Self {
+        Self { triangles, cleared: &|_| false, pieces: None }
+    }
+}
+
+/// The piece of a triangle, a number below two to the 24th.
+pub(super) type Pieces<'a> = dyn Fn(u32) -> u32 + Sync + 'a;
+
+/// The same among some triangles.
 pub(super) fn intersecting_pairs_of(
     places: &[Vec3],
     triangles: &[[u32; 3]],
-    among: &[u32],
-    cleared: &Cleared<'_>,
+    Suspects { triangles: among, cleared, pieces }: Suspects<'_>,
     slabs: &Slabs,
 ) -> Vec<[u32; 2]> {
     if among.is_empty() {
@@ -150,7 +173,8 @@ pub(super) fn intersecting_pairs_of(
     if fresh[fresh.len() - 1][0] == 0 {
         return Vec::new();
     }
-    let search = Search { places, triangles, among, tree: Tree::new(slabs, places, triangles, among), fresh };
+    let tree = Tree::new(slabs, places, triangles, among, pieces);
+    let search = Search { places, triangles, among, tree, fresh };
     let of_leaf = |leaf: usize| {
         let mut pairs = Vec::new();
         search.descend(search.tree.levels.len() - 1, 0, leaf, &search.tree.leaves[leaf], &mut pairs);
@@ -167,7 +191,7 @@ struct Search<'a> {
     places: &'a [Vec3],
     triangles: &'a [[u32; 3]],
     among: &'a [u32],
-    tree: Tree<'a>,
+    tree: Tree,
     /// Of every node: a bit for each child with triangles that are not cleared.
     fresh: Vec<Vec<u32>>,
 }
@@ -224,7 +248,7 @@ impl Search<'_> {
 }
 
 /// Level by level, a bit for each child of a node that has triangles that are not cleared.
-fn fresh(among: &[u32], cleared: &Cleared<'_>) -> Vec<Vec<u32>> {
+fn fresh(among: &[u32], cleared: &(dyn Fn(u32) -> bool + Sync)) -> Vec<Vec<u32>> {
     let bits = |eight: &[bool]| eight.iter().enumerate().fold(0, |bits, (k, &is)| bits | u32::from(is) << k);
     let mut below: Vec<bool> = among.iter().map(|&t| !cleared(t)).collect();
     let mut levels: Vec<Vec<u32>> = vec![below.chunks(WIDE).map(bits).collect()];

@@ -2,8 +2,9 @@
 
 use glam::{DAffine3, Vec3};
 
-use super::contact::{Suspects, corners, grown};
+use super::contact::{corners, grown};
 use super::coupling::shift;
+use super::pairs::Suspects;
 use super::predictor::{linear, skinned};
 use super::solver::Frame;
 
@@ -90,7 +91,7 @@ impl Frame<'_> {
         }
         let all: Vec<u32> = (0..region.triangles.len() as u32).collect();
         let still = |t: u32| !region.triangles[t as usize].iter().any(|&p| has_moved[p as usize]);
-        let among = Suspects { triangles: &all, cleared: &still };
+        let among = Suspects { cleared: &still, ..Suspects::all_of(&all) };
         self.prepared.contact.own_pairs(region, &places, among, &self.slabs).len()
     }
 }

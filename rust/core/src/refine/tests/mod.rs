@@ -6,7 +6,8 @@ mod sweeps;
 use glam::Vec3;
 
 use super::constraint::{Axis, HalfSpace, bind, energy, project_stretch, self_collision, stretch, volume};
-use super::pairs::{Slabs, intersecting_pairs_of};
+use super::contact::{Contact, Skin};
+use super::pairs::{Slabs, Suspects, intersecting_pairs_of};
 use super::projection::{
     Batch, Blocks, Colouring, Flesh, Kernel, Kind, Limits, Multipliers, OfNodes, Particle, Stretch, project,
 };
@@ -125,13 +126,63 @@ fn slabs_and_cleared_triangles_change_no_pair() {
     let all: Vec<u32> = (0..count).collect();
     let normals = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.0, 0.28, 0.96)];
     let slanting = Slabs::new(normals);
-    let plain = intersecting_pairs_of(&places, &triangles, &all, &|_| false, &Slabs::new([]));
+    let find = |cleared: &(dyn Fn(u32) -> bool + Sync), slabs: &Slabs| {
+        let among = Suspects { cleared, ..Suspects::all_of(&all) };
+        intersecting_pairs_of(&places, &triangles, among, slabs)
+    };
+    let plain = find(&|_| false, &Slabs::new([]));
     assert!(plain.len() > 100);
-    assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &|_| false, &slanting), plain);
+    assert_eq!(find(&|_| false, &slanting), plain);
     let cleared = |t: u32| !t.is_multiple_of(3);
     let fresh: Vec<_> = plain.iter().copied().filter(|pair| !pair.iter().all(|&t| cleared(t))).collect();
-    assert_eq!(intersecting_pairs_of(&places, &triangles, &all, &cleared, &slanting), fresh);
+    assert_eq!(find(&cleared, &slanting), fresh);
     assert!(fresh.len() < plain.len());
+}
+
+/// Loose triangles in three pieces.
+struct Loose(Vec<[u32; 3]>);
+
+impl Skin for Loose {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.0
+    }
+
+    fn name(&self, triangle: u32) -> u32 {
+        triangle
+    }
+
+    fn ring(&self, _vertex: u32) -> &[u32] {
+        &[]
+    }
+
+    fn is_free(&self, _vertex: u32) -> bool {
+        true
+    }
+
+    fn island(&self, triangle: u32) -> u32 {
+        triangle % 3
+    }
+}
+
+#[test]
+fn pairs_looked_for_again_are_those_of_a_fresh_search() {
+    let count = 900u32;
+    let corner = |k: u32| Vec3::new(noise(5 * k), noise(5 * k + 1), noise(5 * k + 2));
+    let mut places: Vec<Vec3> = (0..3 * count).map(|k| corner(k / 3) * 2.0 + corner(k + 7000) * 0.3).collect();
+    let skin = Loose((0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect());
+    let (all, slabs, contact): (Vec<u32>, _, _) = ((0..count).collect(), Slabs::new([]), Contact::default());
+    let mut pairs = contact.own_pairs(&skin, &places, Suspects::all_of(&all), &slabs);
+    let any_piece = intersecting_pairs_of(&places, &skin.0, Suspects::all_of(&all), &slabs);
+    let of_one_piece = |pair: &[u32; 2]| pair[0] % 3 == pair[1] % 3;
+    assert_eq!(pairs, any_piece.into_iter().filter(of_one_piece).collect::<Vec<_>>());
+    for round in 0..4 {
+        let moved: Vec<u32> = (0..3 * count).filter(|i| (i / 7 + round) % 5 == 0).collect();
+        moved.iter().for_each(|&i| places[i as usize] += corner(i + 99 * round) * 0.2);
+        let fresh = contact.own_pairs(&skin, &places, Suspects::all_of(&all), &slabs);
+        assert!(fresh.len() > 30 && fresh != pairs);
+        pairs = contact.own_pairs_again(&skin, &places, &all, (pairs, &moved), &slabs);
+        assert_eq!(pairs, fresh);
+    }
 }
 
 /// Deterministic numbers from -0.5 to 0.5.
