@@ -131,7 +131,7 @@ fn the_neighbourhood_of_a_stroke_is_nearly_the_whole_and_the_rest_stays() {
     let count = ribbon.positions.len();
     // What is solved near the stroke ends at row 856.
     assert_eq!(rows_reached(std::iter::repeat(rate(0.05))), 985 - 856);
-    let gaps = [(940..948, MaskValue::Inpaint), (840..856, MaskValue::Inpaint), (300..310, MaskValue::Inpaint)];
+    let gaps = [(1010..1016, MaskValue::Inpaint), (840..856, MaskValue::Inpaint), (300..310, MaskValue::Inpaint)];
     for stroke in [MaskValue::Inpaint, MaskValue::ForceMatch] {
         let mut kept = prepared(body(3.0), &ribbon);
         let before = near(&mut kept, &strokes(count, &gaps));
@@ -142,12 +142,13 @@ fn the_neighbourhood_of_a_stroke_is_nearly_the_whole_and_the_rest_stays() {
         let (mut largest, mut untouched, mut worst) = (0.0f32, 0, 0.0f32);
         for i in 0..count {
             let (change, error) = (largest_difference(&before, &soon, i), largest_difference(&soon, &exact, i));
-            assert!(change == 0.0 || change >= 1e-4, "{i}: {change}");
+            // Inpainted rows are written in any case.
+            assert!(change == 0.0 || change >= 1e-4 || mask[i] == MaskValue::Inpaint, "{i}: {change}");
             largest = largest.max(change);
             worst = worst.max(error);
             untouched += usize::from(before.weights.row(i) == soon.weights.row(i));
         }
-        assert!(worst < 2e-4 && largest > 0.01, "{stroke:?}: {worst} of {largest}");
+        assert!(worst < 2e-4 && largest > 5e-3, "{stroke:?}: {worst} of {largest}");
         assert!(untouched > count - solved && untouched < count - 1000, "{untouched}");
         assert_eq!((soon.matched, soon.confidence), (exact.matched, exact.confidence));
     }
