@@ -180,18 +180,21 @@ fn of_a_wire_only_the_gap_counts() {
 
 #[test]
 fn on_the_skin_a_slight_tilt_is_no_reason_to_look_further() {
-    // The second wall is as tilted as the plate and lies a little behind the first.
-    for (scale, tilt, bone) in [(1.0, 8e-4, 0), (1.0, 1.3e-3, 1), (0.01, 1.3e-3, 1), (100.0, 8e-4, 0)] {
-        let tilted = |offset: f64, size: f64| relief(move |y, _| tilt * y - offset, 1, size, 3);
-        let walls = [wall(0.0, 1, 4.0, 3), tilted(2e-6 * size_of_wall(), 0.5)].map(|wall| wall.mapped(|p| p * scale));
-        let plate = tilted(0.0, 0.001).mapped(|p| p * scale);
-        let result = transfer(&parts_with_bones(&walls), &plate, None);
+    // The second wall is as tilted as the plate and lies a little behind the first. All heights are shares of the body's size.
+    for (scale, tilt, plate, second, bone) in [
+        (1.0, 8e-4, 0.0, -2e-6, 0),
+        (1.0, 1.3e-3, 0.0, -2e-6, 1),
+        (0.01, 1.3e-3, 0.0, -2e-6, 1),
+        (100.0, 8e-4, 0.0, -2e-6, 0),
+        (1.0, 1.15e-3, 1e-5, -3e-6, 0),
+        (1.0, 2e-3, 1e-5, -3e-6, 1),
+    ] {
+        let tilted = |height: f64, size: f64| relief(move |y, _| tilt * y + height * size_of_wall(), 1, size, 3);
+        let walls = [wall(0.0, 1, 4.0, 3), tilted(second, 0.5)].map(|wall| wall.mapped(|p| p * scale));
+        let result = transfer(&parts_with_bones(&walls), &tilted(plate, 0.001).mapped(|p| p * scale), None);
         let expected = [0, 1].map(|k| if k == bone { 1.0 } else { 0.0 });
-        assert!(
-            (0..16).all(|i| is_row(&result.weights, i, &expected)),
-            "{scale}, {tilt}: {:?}",
-            dense(&result.weights, 0)
-        );
+        let is_expected = (0..16).all(|i| is_row(&result.weights, i, &expected));
+        assert!(is_expected, "{scale}, {tilt}, {plate}: {:?}", dense(&result.weights, 0));
     }
 }
 

@@ -205,13 +205,41 @@ fn a_stroke_that_makes_a_part_reached_solves_all_of_it() {
 }
 
 #[test]
-fn a_solve_is_kept_from_thirty_thousand_unknowns_on() {
-    let ribbon = ribbon(1000, |_| 0.05);
-    for (held, keeps) in [(0, true), (1, false)] {
-        let mut mask = strokes(30_000, &[]);
+fn what_lies_across_a_held_row_is_inpainted_again() {
+    // The energy couples two-rings: what is inpainted on either side of row 450, which is held, depends on each other.
+    let ribbon = ribbon(1050, |_| 0.05);
+    let count = ribbon.positions.len();
+    let held = [(450..451, MaskValue::ForceMatch), (451..460, MaskValue::Inpaint)];
+    let mut kept = prepared(body(3.0), &ribbon);
+    let before = near(&mut kept, &strokes(count, &held));
+    let mask = strokes(count, &[&held[..], &[(430..450, MaskValue::Inpaint)]].concat());
+    let soon = near(&mut kept, &mask);
+    assert!(soon.report.solved_near.is_some());
+    let exact = prepared(body(3.0), &ribbon).solve(Some(&mask), &settings(), &Progress::default()).unwrap();
+    let largest = |a: &Transfer, b: &Transfer| {
+        (451 * ACROSS..460 * ACROSS).map(|i| largest_difference(a, b, i)).fold(0.0, f32::max)
+    };
+    assert!(largest(&before, &exact) > 1e-3, "the stroke changes nothing there: {}", largest(&before, &exact));
+    assert!(largest(&soon, &exact) < 2e-4, "{}", largest(&soon, &exact));
+}
+
+#[test]
+fn a_solve_is_kept_for_strokes_from_thirty_thousand_unknowns_on() {
+    let ribbon = ribbon(1001, |row| if row == 0 { 0.0 } else { 0.05 });
+    let short = Length::Absolute(0.01);
+    let paper = Settings { method: MatchMethod::ClosestPoint, max_distance: short, ..settings() };
+    let smoothed = Settings { smoothing_iterations: 1, ..settings() };
+    for (settings, held, keeps) in
+        [(settings(), 30, true), (settings(), 31, false), (smoothed, 30, false), (paper, 30, false)]
+    {
+        let mut mask = strokes(30_030, &[]);
         mask[..held].fill(MaskValue::ForceMatch);
-        let mut prepared = prepared(body(3.0), &ribbon);
-        near(&mut prepared, &mask);
-        assert_eq!(prepared.has_base(), keeps);
+        let (mask, progress) = (Some(&mask[..]), Progress::default());
+        let mut prepared = Inpainting::new(body(3.0), target(&ribbon), &settings, &progress).unwrap();
+        let result = prepared.solve(mask, &settings, &progress).unwrap();
+        assert_eq!(result.report.inpainted, 30_030 - held);
+        assert!(!prepared.has_base(), "nobody has asked for strokes");
+        prepared.solve_near(mask, &settings, &progress).unwrap();
+        assert_eq!(prepared.has_base(), keeps, "{:?}, {held}", settings.method);
     }
 }
