@@ -6,8 +6,8 @@ use crate::error::Result;
 /// one counts relative to one, for what is neglected does not depend on them.
 pub(super) const DOUBTFUL: f64 = 1e-4;
 
-/// What `solve` finds. If its backward error is doubtful, what it finds once more, after `examine` has not refused the factor:
-/// another one may have taken its place by then.
+/// What `solve` finds. If its backward error is doubtful, what it finds once more, unless `examine` refuses the factor: another
+/// one may have taken its place by then.
 pub(super) fn solved_with_care<T>(
     solve: impl Fn() -> Result<T>,
     residual: impl FnOnce(&T) -> f64,

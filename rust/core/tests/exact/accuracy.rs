@@ -18,7 +18,8 @@ fn factor(fill: &mut Fill, constraints: Vec<Constraint>, length: f64) -> Result<
     fill.factor(assembled, &progress)
 }
 
-/// A disc of concentric rings of eight vertices, each half as wide as the one around it; from the 24th on all have collapsed.
+/// A disc of concentric rings of eight vertices, each half as wide as the one around it; from the 24th on all
+/// have collapsed.
 fn shrinking_rings(rings: usize) -> Fixture {
     let radius = |ring: usize| 2.0 * 0.5f64.powi(ring as i32).max(1e-7);
     let position = |k: usize| {

@@ -180,7 +180,8 @@ fn of_a_wire_only_the_gap_counts() {
 
 #[test]
 fn on_the_skin_a_slight_tilt_is_no_reason_to_look_further() {
-    // The second wall is as tilted as the plate and lies a little behind the first. All heights are shares of the body's size.
+    // The second wall is as tilted as the plate and lies a little behind the first. All heights are shares of
+    // the body's size.
     for (scale, tilt, plate, second, bone) in [
         (1.0, 8e-4, 0.0, -2e-6, 0),
         (1.0, 1.3e-3, 0.0, -2e-6, 1),
@@ -211,7 +212,8 @@ fn between_two_walls_the_mean_of_both_points_tells_how_the_skin_stretches() {
     let mut card = wall(0.0, 1, 0.3, 3).mapped(|p| p + DVec3::new(0.0, 0.21, 0.42));
     let (stiffness, masses) = stiffness_and_masses(&card);
     card.triangles.extend(card.triangles.clone().iter().map(|&[a, b, c]| [a, c, b]));
-    // The walls' triangles differ; both points are as near and agree as well, so that they count by the areas of their triangles.
+    // The walls' triangles differ; both points are as near and agree as well, so that they count by the areas of
+    // their triangles.
     let shares = [0.5, 8.0 / 9.0].map(|area| area / (0.5 + 8.0 / 9.0));
     let row = |p: &[f32; 3]| {
         let t = f64::from(weight(*p));

@@ -65,7 +65,8 @@ pub fn solved(mut matrix: Matrix, mut right: Matrix) -> Matrix {
     (0..n).map(|k| right[k].iter().map(|x| x / matrix[k][k]).collect()).collect()
 }
 
-/// The rows that minimise `sum w' Q w + sum over the given of b |w - s|^2`; `given` are (vertex, b, row), `fixed` (vertex, row).
+/// The rows that minimise `sum w' Q w + sum over the given of b |w - s|^2`; `given` are (vertex, b, row),
+/// `fixed` (vertex, row).
 pub fn minimiser<const C: usize>(q: &Matrix, given: &[(usize, f64, [f64; C])], fixed: &[(usize, [f64; C])]) -> Matrix {
     let n = q.len();
     let (mut matrix, mut right) = (q.clone(), vec![vec![0.0; C]; n]);
