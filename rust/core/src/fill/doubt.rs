@@ -2,12 +2,12 @@
 
 use crate::error::Result;
 
-/// Backward error of a solution, with all that was neglected, above which the factor is looked into. That of values below
+/// Backward error of a solution, with all that was neglected, above which the factor is examined. That of values below
 /// one counts relative to one, for what is neglected does not depend on them.
 pub(super) const DOUBTFUL: f64 = 1e-4;
 
-/// What `solve` finds. If its backward error is doubtful, what it finds once more, unless `examine` refuses the factor: another
-/// one may have taken its place by then.
+/// What `solve` finds. If its backward error is doubtful, what it finds once more, unless `examine` refuses the factor:
+/// another one may have taken its place by then.
 pub(super) fn solved_with_care<T>(
     solve: impl Fn() -> Result<T>,
     residual: impl FnOnce(&T) -> f64,
