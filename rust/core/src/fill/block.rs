@@ -15,6 +15,8 @@ use crate::progress::Progress;
 
 /// Backward error above which a solution is refused.
 const REFUSE_ABOVE: f64 = 1e-8;
+/// The same of a factor in single precision, which serves screened solves: from here on the solver looks for another factor.
+const REFUSE_SINGLE_ABOVE: f64 = 1e-5;
 
 /// Which energy a block minimises, and how its factor is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -235,11 +237,11 @@ impl Block {
         Ok(BlockRows { columns, values: Values::Solved(solution) })
     }
 
-    /// Backward error of a solve whose answer is 1 everywhere.
+    /// Solves for 1 everywhere, so that the solver looks for another factor if this one is wrong.
     ///
     /// # Errors
-    /// [`Error::NotPositiveDefinite`] if it stays above 1e-8.
-    pub(super) fn accuracy(&self) -> Result<f64> {
+    /// [`Error::NotPositiveDefinite`] if the backward error stays above what the precision of the factor allows.
+    pub(super) fn examine(&self) -> Result<()> {
         let measure = || {
             let mut ones: Vec<f64> = vec![0.0; self.unknowns.len()];
             self.soft.iter().for_each(|&(k, confidence)| ones[k as usize] = confidence);
@@ -249,17 +251,18 @@ impl Block {
             self.factor.solve(&RightHandSides::dense(ones.len(), 1, ones)).residual()
         };
         let accuracy = *self.accuracy.get_or_init(measure);
-        self.is_accurate(accuracy).map(|()| accuracy)
+        let is_single = self.form.precision == Precision::Single;
+        self.refuse_above(if is_single { REFUSE_SINGLE_ABOVE } else { REFUSE_ABOVE }, accuracy)
     }
 
-    fn is_accurate(&self, residual: f64) -> Result<()> {
-        let accurate = residual <= REFUSE_ABOVE;
+    fn refuse_above(&self, limit: f64, residual: f64) -> Result<()> {
+        let accurate = residual <= limit;
         accurate.then_some(()).ok_or(Error::NotPositiveDefinite { vertex: self.unknowns[0] as usize })
     }
 
     fn checked(&self, right_hand_sides: &RightHandSides) -> Result<Solution<'_>> {
         let solution = self.factor.solve(right_hand_sides);
-        self.is_accurate(solution.residual()).map(|()| solution)
+        self.refuse_above(REFUSE_ABOVE, solution.residual()).map(|()| solution)
     }
 
     /// `diag(b) W_0 - Q_UI W_I`, (unknowns, columns); `add_soft` adds the first term for soft unknown s to a row.

@@ -13,6 +13,7 @@
 mod block;
 mod blocks;
 mod constraint;
+mod doubt;
 mod filled;
 mod rows;
 pub mod screened;

@@ -21,6 +21,7 @@
 use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver, Term, Workspace};
 
 use super::block::{Block, BlockRows, Places, Solves, SparseColumns};
+use super::doubt::{DOUBTFUL, solved_with_care};
 use super::rows::Ragged;
 use crate::adjacency::NONE;
 use crate::error::Result;
@@ -31,8 +32,6 @@ use crate::progress::Progress;
 const REACH: f64 = 1.5;
 /// Magnitude that counts as zero between solves. Single precision errs by less where lengths are some tens of edges.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Backward error of the first solve, with all that was neglected, above which the factor is looked into.
-const DOUBTFUL: f64 = 1e-4;
 /// Least magnitude of a weight that is handed on.
 const LEAST: f64 = 1e-5;
 
@@ -105,19 +104,13 @@ struct Screened<'a, 'b> {
 /// Solves a block.
 ///
 /// # Errors
-/// Those of [`Block::accuracy`], [`Error::Cancelled`](crate::Error::Cancelled).
+/// Those of [`Block::examine`], [`Error::Cancelled`](crate::Error::Cancelled).
 pub(super) fn solve<'b>(block: &'b Block, given: Given<'_>, progress: &Progress) -> Result<BlockRows<'b>> {
     let screened = Screened::new(block, given);
     if let Some((column, value)) = screened.only_row() {
         return Ok(BlockRows::constant(column, value));
     }
-    let rows = screened.solve(progress)?;
-    if rows.residual() <= DOUBTFUL {
-        return Ok(rows);
-    }
-    // Another factor may have taken its place by then.
-    block.accuracy()?;
-    screened.solve(progress)
+    solved_with_care(|| screened.solve(progress), BlockRows::residual, || block.examine())
 }
 
 impl<'a, 'b> Screened<'a, 'b> {
@@ -255,6 +248,7 @@ impl<'b> Group<'_, 'b> {
             self.substitute(solve, terms, least, &mut work)
         };
         let (first, residual) = solve(0, &[(&given, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
+        let residual = if residual > DOUBTFUL { residual * self.largest(&first).min(1.0) } else { residual };
         let (second, _) = solve(1, &[(&first, &pull), (&added, &once)], &|_| NEGLIGIBLE)?;
         let scale = |k: usize| confidence[k] * confidence[k] / mass[k];
         let to_given = |k: usize| scale(k) / (REACH * REACH);
@@ -270,6 +264,12 @@ impl<'b> Group<'_, 'b> {
         let corrected: [Term; 3] = [(&correction, &|k| mass[k]), (&second, &pull), (&added, &once)];
         let (rows, _) = solve(CORRECTION + 1, &corrected, &|_| LEAST)?;
         Ok((Solves { earlier: first.map(|first| [first, second, correction]), rows }, residual))
+    }
+
+    /// The largest magnitude of a solution.
+    fn largest(&self, found: &SparseRows<'_>) -> f64 {
+        let of_row = |k: usize| found.row(k).fold(0.0, |largest: f64, (_, value)| largest.max(value.abs()));
+        (0..self.screened.count()).map(of_row).fold(0.0, f64::max)
     }
 
     /// The solution of solve number `solve` for the sum of `terms` and what is held, and of the first one the backward error.

@@ -65,6 +65,22 @@ pub fn solved(mut matrix: Matrix, mut right: Matrix) -> Matrix {
     (0..n).map(|k| right[k].iter().map(|x| x / matrix[k][k]).collect()).collect()
 }
 
+/// The rows that minimise `sum w' Q w + sum over the given of b |w - s|^2`; `given` are (vertex, b, row),
+/// `fixed` (vertex, row).
+pub fn minimiser<const C: usize>(q: &Matrix, given: &[(usize, f64, [f64; C])], fixed: &[(usize, [f64; C])]) -> Matrix {
+    let n = q.len();
+    let (mut matrix, mut right) = (q.clone(), vec![vec![0.0; C]; n]);
+    for &(i, b, row) in given {
+        matrix[i][i] += b;
+        (0..C).for_each(|c| right[i][c] += b * row[c]);
+    }
+    for &(i, row) in fixed {
+        matrix[i] = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
+        right[i] = row.to_vec();
+    }
+    solved(matrix, right)
+}
+
 /// Rows pulled towards given ones over lengths of their own, by four solves: what `fill::screened` documents.
 pub struct Screened {
     pub stiffness: Matrix,

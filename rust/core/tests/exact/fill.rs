@@ -1,7 +1,7 @@
 //! Filling against dense systems that are assembled and eliminated here.
 
 use crate::common::{Fixture, noise};
-use crate::dense::{Matrix, energy, solved, stiffness_and_masses};
+use crate::dense::{energy, minimiser, stiffness_and_masses};
 use crate::sheet::{COLUMNS, assert_rows, confidence, given_row, mixed, push_given, row_of, sheet};
 use skinwright_core::fill::{Constraint, Fill, Row};
 use skinwright_core::{Error, Progress, Weld};
@@ -9,21 +9,6 @@ use skinwright_core::{Error, Progress, Weld};
 fn assemble_and_factor(fill: &mut Fill, constraints: &[Constraint], length: f64) {
     let assembled = fill.assemble(constraints.to_vec(), length, &Progress::default()).unwrap();
     fill.factor(assembled, &Progress::default()).unwrap();
-}
-
-/// The rows that minimise `sum w' Q w + sum over the given of b |w - s|^2`; `given` are (vertex, b, row), `fixed` (vertex, row).
-fn minimiser(q: &Matrix, given: &[(usize, f64, [f64; 3])], fixed: &[(usize, [f64; 3])]) -> Matrix {
-    let n = q.len();
-    let (mut matrix, mut right) = (q.clone(), vec![vec![0.0; COLUMNS]; n]);
-    for &(i, b, row) in given {
-        matrix[i][i] += b;
-        (0..COLUMNS).for_each(|c| right[i][c] += b * row[c]);
-    }
-    for &(i, row) in fixed {
-        matrix[i] = (0..n).map(|j| f64::from(u8::from(i == j))).collect();
-        right[i] = row.to_vec();
-    }
-    solved(matrix, right)
 }
 
 #[test]

@@ -8,12 +8,14 @@ mod dense;
 mod sheet;
 mod walls;
 
+mod accuracy;
 mod choices;
 mod confidence;
 mod fill;
 mod hanging;
 mod islands;
 mod matching;
+mod near;
 mod prepared;
 mod screened;
 mod sculpt_exact;

@@ -212,3 +212,57 @@ fn what_is_known_before_a_solve_is_what_the_solve_says() {
     let seconds = kept.solve(None, &within(0.2), &progress).unwrap();
     assert_eq!(seconds.weights, transfer(&source, &sheet, &within(0.2)).weights);
 }
+
+/// A plate of 16 x 16 vertices, 0.004 apart, that stands out from `rim` to `top` in two steep steps.
+fn hat(rim: f64, top: f64) -> Fixture {
+    let height = |y: f64, z: f64| match (y.abs().max(z.abs()) / 0.004).floor() as u32 {
+        0..3 => top,
+        3 => f64::midpoint(rim, top),
+        _ => rim,
+    };
+    relief(height, 1, 0.06, 15).named("hat")
+}
+
+#[test]
+fn a_ring_that_agrees_neither_way_does_not_speak_for_the_patch_in_it() {
+    // The top is nearer to the thigh that faces it, the brim to its own; the steep ring looks aside.
+    for settings in methods(&within(0.3)) {
+        let result = transfer(&thighs(-0.02, 0.02, 4.0), &hat(-0.018, 0.006), &settings);
+        assert!(follows(&result, 0), "{:?}", settings.method);
+    }
+}
+
+#[test]
+fn a_vertex_inside_the_other_thigh_looks_for_its_own_as_far_as_it_may_match() {
+    // The middle is 0.05 deep in the right thigh and 0.55 before the left one.
+    let leg = trouser(-0.25, 0.15);
+    let middle = 8 * 16 + 8;
+    for (max_distance, row) in [(0.6, [1.0, 0.0]), (0.54, [0.0, 1.0])] {
+        let result = transfer(&thighs(-0.4, 0.1, 4.0), &leg, &within(max_distance));
+        assert!(is_row(&result.weights, middle, &row), "{max_distance}: {:?}", dense(&result.weights, middle));
+        assert!(result.matched[middle]);
+    }
+}
+
+#[test]
+fn a_face_counts_only_for_vertices_before_it() {
+    // Bone 2 looks the right way at x = 0.11, but the middle lies behind it; its own thigh is farther away.
+    let walls = [wall(-0.1, 1, 4.0, 20), wall(0.1, -1, 4.0, 20), wall(0.11, 1, 0.5, 4)];
+    let result = transfer(&parts_with_bones(&walls), &trouser(-0.05, 0.02), &within(0.3));
+    let middle = 8 * 16 + 8;
+    assert!(is_row(&result.weights, middle, &[1.0, 0.0, 0.0]), "{:?}", dense(&result.weights, middle));
+}
+
+#[test]
+fn only_vertices_that_match_flipped_look_for_another_face() {
+    // Over a floor and beside a wall; what is nearer to the wall is at a right angle to it.
+    let upwards = |p: DVec3| DVec3::new(-p.z, p.y, p.x);
+    let floor = wall(-0.15, 1, 4.0, 20).mapped(upwards);
+    let body = parts_with_bones(&[floor, wall(0.0, 1, 4.0, 20)]);
+    let plate = wall(0.0, 1, 1.0, 10).mapped(|p| upwards(p) + DVec3::X * 0.52);
+    let result = transfer(&body, &plate, &within(0.3));
+    for (i, p) in plate.positions.iter().enumerate() {
+        assert_eq!(result.matched[i], p[0] > 0.15, "{p:?}");
+        assert!((result.distances[i] - p[0].min(0.15)).abs() < 1e-6);
+    }
+}

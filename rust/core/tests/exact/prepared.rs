@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::common::Fixture;
-use crate::walls::{dense, is_row, level, shaft, source, target, wall};
+use crate::dense::{energy, minimiser, stiffness_and_masses};
+use crate::walls::{dense, is_row, level, relief, shaft, source, target, wall};
 use glam::DVec3;
 use skinwright_core::transfer::{
     Inpainting, IslandPolicy, Length, MaskValue, MatchMethod, Settings, SmallIslands, Transfer, transfer_weights,
@@ -111,6 +112,96 @@ fn a_part_out_of_the_papers_reach_hangs_unless_a_vertex_is_forced() {
         assert!(result.report.unmatched_islands.is_empty());
     }
     assert_eq!(forced.confidence[30], 1.0);
+}
+
+#[test]
+fn vertices_over_skin_without_weights_do_not_make_a_part_reached() {
+    let body = source(&[wall(0.0, 1, 4.0, 16)], 2, |_, [_, y, _]| {
+        let t = (0.2 * y + 0.5).clamp(0.0, 1.0);
+        if y > 1.1 { (vec![], vec![]) } else { (vec![0, 1], vec![1.0 - t, t]) }
+    });
+    // The sheet lies on the wall; of the plate only what is over bare skin is within reach.
+    let plate = relief(|y, _| if y > 0.0 { 0.05 } else { 0.4 }, 1, 0.8, 2).mapped(|p| p + DVec3::Y * 1.0);
+    assert!(plate.positions.iter().any(|p| p[0] == 0.05 && p[1] > 1.3) && plate.positions.iter().any(|p| p[1] < 1.1));
+    let both = wall(0.02, 1, 1.0, 4).mapped(|p| p - DVec3::Y).joined(plate);
+    let settings = Settings {
+        method: MatchMethod::Confidence,
+        small_islands: SmallIslands::Solved,
+        max_distance: Length::Absolute(0.1),
+        max_normal_angle: PI,
+        ..Settings::default()
+    };
+    let result = transfer_weights(&body, target(&both), None, &settings).unwrap();
+    assert!(result.confidence[25..].iter().all(|&confidence| confidence == 0.0), "{:?}", &result.confidence[25..]);
+    assert_eq!(result.report.unmatched_islands.len(), 1);
+}
+
+#[test]
+fn what_has_no_row_is_filled_in_by_the_papers_energy_beside_what_the_mask_forbids() {
+    let body = source(&[wall(0.0, 1, 4.0, 16)], 2, |_, [_, y, _]| {
+        let t = (0.2 * y * y + 0.2).clamp(0.0, 1.0);
+        if y > 1.1 { (vec![], vec![]) } else { (vec![0, 1], vec![1.0 - t, t]) }
+    });
+    let sheet = wall(0.2, 1, 1.6, 8).mapped(|p| p + DVec3::Y * 0.8);
+    let settings = Settings {
+        method: MatchMethod::Confidence,
+        small_islands: SmallIslands::Solved,
+        max_distance: Length::Absolute(1.0),
+        smoothness_length: Length::Absolute(0.3),
+        ..Settings::default()
+    };
+    let mut mask = vec![MaskValue::Automatic; 81];
+    mask[12] = MaskValue::Inpaint;
+    let result = transfer_weights(&body, target(&sheet), Some(&mask), &settings).unwrap();
+    // Above y = 1.25 the wall has no weights.
+    let is_known = |i: usize| i != 12 && sheet.positions[i][1] < 1.24;
+    let own = |i: usize| [0, 1].map(|bone| f64::from(dense(&result.weights, i)[bone]));
+    let fixed: Vec<_> = (0..81).filter(|&i| is_known(i)).map(|i| (i, own(i))).collect();
+    assert!(fixed.len() < 70 && (0..81).all(|i| is_known(i) == (result.confidence[i] > 0.0)));
+    let (stiffness, masses) = stiffness_and_masses(&sheet);
+    let expected = minimiser(&energy(&stiffness, &masses, 0.3), &[], &fixed);
+    for (i, expected) in expected.iter().enumerate() {
+        assert!((own(i)[1] - expected[1]).abs() < 1e-5, "{i}: {:?} is not {expected:?}", own(i));
+    }
+}
+
+#[test]
+fn rows_of_the_source_that_do_not_sum_to_one_are_counted() {
+    let sums = [1.0, 1.0009, 0.9991, 1.002, 0.998, 2.0, 0.25, 0.0, 0.0];
+    let mut at = 0;
+    let body = source(&[wall(0.0, 1, 4.0, 2)], 1, |_, _| {
+        at += 1;
+        (vec![0], vec![sums[at - 1]])
+    });
+    let result = transfer_weights(&body, target(&wall(0.01, 1, 1.0, 2)), None, &Settings::default()).unwrap();
+    assert_eq!((result.report.source_unweighted, result.report.source_unnormalised), (2, 4));
+}
+
+#[test]
+fn a_source_without_area_is_as_large_as_its_bounding_box() {
+    let line = Fixture::new("line", vec![[0.0; 3], [1.0, 2.0, 2.0], [2.0, 4.0, 4.0]], vec![[0, 1, 2]]);
+    assert!((source(&[line], 1, |_, _| (vec![0], vec![1.0])).size() - 6.0).abs() < 1e-6);
+}
+
+#[test]
+fn vertices_of_the_source_are_one_within_a_millionth_of_its_diagonal() {
+    // Two quads that meet at a right angle at the z axis, one of them moved away by a share of the diagonal.
+    for scale in [1.0, 1000.0] {
+        let first = wall(0.0, 1, 2.0, 1).mapped(|p| p + DVec3::Y);
+        let second = first.mapped(|p| DVec3::new(-p.y, p.x, p.z));
+        let diagonal = scale * 12f64.sqrt();
+        for (share, is_one) in [(5e-7, true), (2e-6, false)] {
+            let moved = second.mapped(|p| p * scale - DVec3::X * share * diagonal);
+            let both = [first.mapped(|p| p * scale), moved];
+            let body = source(&both, 1, |_, _| (vec![0], vec![1.0]));
+            let positions = both.iter().flat_map(|part| &part.positions);
+            for (normal, _) in std::iter::zip(body.normals(), positions)
+                .filter(|(_, p)| f64::from(p[1]) < 0.1 && f64::from(p[0]) > -0.1)
+            {
+                assert_eq!(normal.abs().max_element() < 0.9, is_one, "{scale}, {share}: {normal}");
+            }
+        }
+    }
 }
 
 #[test]

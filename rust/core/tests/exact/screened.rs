@@ -10,16 +10,17 @@ use skinwright_core::fill::{Constraint, Fill, GivenRows, Patch, Ragged, Row, Row
 fn a_screened_solve_takes_the_four_steps_that_are_written_down() {
     // What is negligible must not depend on the unit of length, nor on how lengths compare with edges.
     for scale in [1.0, 100.0, 0.01] {
-        takes_four_steps(scale, scale);
+        takes_four_steps(scale, scale, mixed);
+        takes_four_steps(scale, scale, |i| Constraint::Soft(noise(i as u64, 3)));
     }
-    takes_four_steps(1.0, 8.0);
+    takes_four_steps(1.0, 8.0, mixed);
 }
 
-/// On a sheet of this `size`, with rows that are trusted over one to four times `reach`.
-fn takes_four_steps(size: f64, reach: f64) {
+/// On a sheet of this `size`, with soft rows that are trusted over one to four times `reach`.
+fn takes_four_steps(size: f64, reach: f64, kind: impl Fn(usize) -> Constraint) {
     let mesh = sheet().mapped(|p| p * size);
     let (stiffness, masses) = stiffness_and_masses(&mesh);
-    let constraint = |i: usize| match mixed(i) {
+    let constraint = |i: usize| match kind(i) {
         Constraint::Soft(x) => Constraint::Soft(screened::confidence(masses[i], reach * (1.0 + 2.0 * x))),
         other => other,
     };

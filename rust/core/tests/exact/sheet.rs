@@ -19,6 +19,21 @@ pub fn sheet() -> Fixture {
     Fixture::new("sheet", (0..30).map(position).collect(), (0..20).flat_map(quad).collect())
 }
 
+/// A curved sheet of m x n vertices, about one unit apart.
+pub fn wide_sheet(m: usize, n: usize) -> Fixture {
+    let position = |k: usize| {
+        let (i, j) = ((k / n) as f64, (k % n) as f64);
+        let [a, b, c] = [0, 1, 2].map(|axis| 0.4 * noise(k as u64, axis));
+        [(i + a) as f32, (j + b) as f32, (0.1 * i + c) as f32]
+    };
+    let quad = |k: usize| {
+        let i = (k / (n - 1) * n + k % (n - 1)) as u32;
+        let n = n as u32;
+        [[i, i + n, i + n + 1], [i, i + n + 1, i + 1]]
+    };
+    Fixture::new("wide sheet", (0..m * n).map(position).collect(), (0..(m - 1) * (n - 1)).flat_map(quad).collect())
+}
+
 /// The row given for vertex i, dense.
 pub fn given_row(i: usize) -> [f64; COLUMNS] {
     let x = [0, 1, 2].map(|column| noise(i as u64, 10 + column));

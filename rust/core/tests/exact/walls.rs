@@ -27,7 +27,7 @@ pub fn relief(x: impl Fn(f64, f64) -> f64, facing: i32, size: f64, n: usize) -> 
 }
 
 /// A body whose vertices have the rows that `row` makes of their position and of their part's number.
-pub fn source(parts: &[Fixture], n_bones: u32, row: impl Fn(usize, [f32; 3]) -> Row) -> Source {
+pub fn source(parts: &[Fixture], n_bones: u32, mut row: impl FnMut(usize, [f32; 3]) -> Row) -> Source {
     let rows: Vec<Row> = std::iter::zip(0.., parts)
         .flat_map(|(part, fixture)| fixture.positions.iter().map(move |&p| (part, p)))
         .map(|(part, p)| row(part, p))
