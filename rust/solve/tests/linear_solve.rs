@@ -190,6 +190,7 @@ fn cases() -> Vec<Case> {
         with_positions("many equal positions", grid("", 80, 80), |_, _| Vec3::ONE),
         with_positions("collinear", grid("", 60, 50), |_, p| Vec3::ONE * p.x),
         with_positions("huge coordinates", grid("", 60, 50), |_, p| p * 1e30),
+        with_positions("tiny coordinates", tube("", 90, 60), |_, p| p * 1e-25),
         with_positions("not finite", grid("", 40, 50), |i, p| if i % 7 == 0 { Vec3::NAN } else { p }),
         tiny,
     ]

@@ -50,8 +50,11 @@ pub(crate) fn dissect(graph: &Graph, positions: &[Vec3], stop: &AtomicBool) -> O
 
 fn points(graph: &Graph, positions: &[Vec3]) -> Vec<Point> {
     let point = |(i, &position): (usize, &Vec3)| {
-        let farthest = graph.neighbours(i).map(|j| position.distance_squared(positions[j])).fold(0.0, f32::max);
-        Point { position, reach: farthest.sqrt(), unknown: i as u32, key: 0.0 }
+        // In f64: the square of a tiny edge is zero in f32, and what seems not to cross a plane is not looked at.
+        let from = position.as_dvec3();
+        let squared = graph.neighbours(i).map(|j| from.distance_squared(positions[j].as_dvec3()));
+        let farthest = squared.fold(0.0, f64::max);
+        Point { position, reach: farthest.sqrt() as f32, unknown: i as u32, key: 0.0 }
     };
     positions.par_iter().with_min_len(FORK).enumerate().map(point).collect()
 }
