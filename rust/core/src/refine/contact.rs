@@ -33,6 +33,15 @@ pub(super) struct Contact {
     at_rest: HashSet<[u32; 2]>,
 }
 
+/// How far folds are pushed.
+#[derive(Clone, Copy)]
+pub(super) struct Effort {
+    /// No vertex moves farther.
+    pub(super) farthest: f32,
+    /// No more rounds of pushing follow on each other.
+    pub(super) rounds: usize,
+}
+
 /// Some skin: triangles, their numbers in the whole, neighbours, and which vertices may move.
 pub(super) trait Skin: Sync {
     fn triangles(&self) -> &[[u32; 3]];
@@ -95,8 +104,18 @@ impl Contact {
 
     /// Pairs of one piece among all triangles of the skin that do not intersect at rest.
     pub(super) fn all_own_pairs(&self, skin: &dyn Skin, places: &[Vec3], slabs: &Slabs) -> Vec<[u32; 2]> {
-        let all = by_island(skin, (0..skin.triangles().len() as u32).collect());
-        self.own_pairs(skin, places, Suspects::all_of(&all), slabs)
+        self.own_pairs(skin, places, Suspects::all_of(&all_triangles(skin)), slabs)
+    }
+
+    /// The same after some vertices have `moved`, given the pairs `before`.
+    pub(super) fn all_own_pairs_again(
+        &self,
+        skin: &dyn Skin,
+        places: &[Vec3],
+        since: (Vec<[u32; 2]>, &[u32]),
+        slabs: &Slabs,
+    ) -> Vec<[u32; 2]> {
+        self.own_pairs_again(skin, places, &all_triangles(skin), since, slabs)
     }
 
     /// Pairs of one piece of skin. Layers of cloth that come through each other do so because their weights differ, and
@@ -118,8 +137,8 @@ impl Contact {
         pairs
     }
 
-    /// The same pairs after some vertices have `moved`, among triangles that had the pairs `before`.
-    pub(super) fn own_pairs_again(
+    /// The same among some triangles.
+    fn own_pairs_again(
         &self,
         skin: &dyn Skin,
         places: &[Vec3],
@@ -139,14 +158,14 @@ impl Contact {
     /// Pushes until no pair of the `suspects` intersects that does not at rest; if some remain, the round with the fewest counts.
     /// Returns the vertices that moved, ascending, and the number of pairs that remain.
     ///
-    /// No vertex moves farther than `farthest`: where whole layers of cloth lie in each other, smoothing would go on until
+    /// No vertex moves farther than `effort` says: where whole layers of cloth lie in each other, smoothing would go on until
     /// nothing is left of them.
     pub(super) fn part(
         &self,
         skin: &dyn Skin,
         places: &mut Vec<Vec3>,
         suspects: Suspects<'_>,
-        farthest: f32,
+        effort: Effort,
         slabs: &Slabs,
     ) -> (Vec<u32>, usize) {
         let triangles = by_island(skin, suspects.triangles.to_vec());
@@ -156,7 +175,7 @@ impl Contact {
             if pairs.is_empty() {
                 break;
             }
-            let (pushed, left) = self.push_apart(skin, places, pairs, farthest, slabs);
+            let (pushed, left) = self.push_apart(skin, places, pairs, effort, slabs);
             let has_moved: HashSet<u32> = pushed.iter().copied().collect();
             moved.extend(pushed);
             pairs = left;
@@ -178,7 +197,7 @@ impl Contact {
         skin: &dyn Skin,
         places: &mut Vec<Vec3>,
         mut pairs: Vec<[u32; 2]>,
-        farthest: f32,
+        Effort { farthest, mut rounds }: Effort,
         slabs: &Slabs,
     ) -> (Vec<u32>, Vec<[u32; 2]>) {
         let around = grown(skin, corners(skin, &pairs), RINGS);
@@ -190,7 +209,8 @@ impl Contact {
         let mut known = self.own_pairs(skin, places, Suspects::all_of(&among), slabs);
         for (rings, step) in TRIES.into_iter().filter(|&(rings, _)| rings <= most_rings) {
             let (mut now, mut left, mut all, mut stalled) = (places.clone(), pairs.clone(), known.clone(), 0);
-            while stalled < STALLED && !pairs.is_empty() {
+            while stalled < STALLED && !pairs.is_empty() && rounds > 0 {
+                rounds -= 1;
                 let pushed = push(skin, &mut now, &left, rings, step);
                 for &i in &pushed {
                     let from = start[i as usize];
@@ -213,6 +233,10 @@ impl Contact {
         }
         (moved, pairs)
     }
+}
+
+fn all_triangles(skin: &dyn Skin) -> Vec<u32> {
+    by_island(skin, (0..skin.triangles().len() as u32).collect())
 }
 
 /// These triangles, those of an island one after the other.

@@ -4,6 +4,7 @@ use glam::{DAffine3, Vec3};
 
 use super::balloon::Balloon;
 use super::constraint::Axis;
+use super::contact::Effort;
 use super::crease::within;
 use super::membrane::Membrane;
 use super::pairs::Suspects;
@@ -34,7 +35,7 @@ impl Frame<'_> {
         let (mut parted, mut left, mut lost, mut cleared) = (Vec::new(), 0, Vec::new(), Vec::new());
         // Planes leave few folds, and balloons none more. Hips have no planes: what parting costs there is restored.
         if self.active.iter().any(|active| !active.joint.is_limb) {
-            (parted, left) = clock.time("contact", || self.part(&suspects, &[]));
+            (parted, left) = clock.time("contact", || self.part(&suspects, &[], quality));
             cleared = if left == 0 { self.places() } else { Vec::new() };
         }
         for _ in 0..quality.balloons() {
@@ -43,7 +44,7 @@ impl Frame<'_> {
                 self.inflate_whole(&axes, pose, skin, &parted);
                 lost
             });
-            let (more, pairs) = clock.time("contact", || self.part(&suspects, &cleared));
+            let (more, pairs) = clock.time("contact", || self.part(&suspects, &cleared, quality));
             left = pairs;
             let is_done = more.is_empty();
             parted.extend(more);
@@ -55,7 +56,7 @@ impl Frame<'_> {
         }
         clock.time("contact", || {
             if self.undo_harm(pose, &axes, &lost, left) {
-                left = self.part(&suspects, &[]).1;
+                left = self.part(&suspects, &[], quality).1;
             }
             self.unfold(pose, left);
         });
@@ -84,7 +85,7 @@ impl Frame<'_> {
 
     /// Takes out what folds are left in the region's skin; returns the particles that moved, and how many pairs remain.
     /// `cleared` are places at which no triangles of the region intersected, if there are any.
-    fn part(&mut self, suspects: &[u32], cleared: &[Vec3]) -> (Vec<u32>, usize) {
+    fn part(&mut self, suspects: &[u32], cleared: &[Vec3], quality: Quality) -> (Vec<u32>, usize) {
         if !self.settings.self_collision {
             return (Vec::new(), 0);
         }
@@ -92,7 +93,8 @@ impl Frame<'_> {
         let stays: Vec<bool> = cleared.iter().zip(&places).map(|(a, b)| (a - b).abs().max_element() < STILL).collect();
         let is_cleared = |t: u32| !stays.is_empty() && region.triangles[t as usize].iter().all(|&p| stays[p as usize]);
         let among = Suspects { cleared: &is_cleared, ..Suspects::all_of(suspects) };
-        let (moved, left) = self.prepared.contact.part(region, &mut places, among, FARTHEST, &self.slabs);
+        let effort = Effort { farthest: FARTHEST, rounds: quality.rounds() };
+        let (moved, left) = self.prepared.contact.part(region, &mut places, among, effort, &self.slabs);
         for &p in &moved {
             let particle = &mut self.local.particles[p as usize];
             [particle[0], particle[1], particle[2]] = places[p as usize].to_array();

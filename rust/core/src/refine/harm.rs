@@ -1,11 +1,14 @@
 //! Joints where solving has done worse than skinning.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, Vec3};
 
 use super::constraint::Axis;
 use super::coupling::place;
 use super::local::Local;
 use super::predictor::{linear, skinned};
+use super::region::Region;
 use super::solver::Frame;
 
 /// Loss of a joint's volume from which it is asked whether skinning did better.
@@ -60,24 +63,29 @@ impl Frame<'_> {
 
     /// Gives back joints until no more than `most` pairs are left; returns whether any was.
     fn undo_folds(&mut self, skin: &[Vec3], most: usize) -> bool {
-        let (mut left, mut is_changed) = (self.own_pairs(&self.places()), false);
+        let (contact, region) = (&self.prepared.contact, self.local.region.clone());
+        let (mut pairs, mut is_changed) = (contact.all_own_pairs(&*region, &self.places(), &self.slabs), false);
         for k in 0..self.active.len() {
-            if left <= most {
+            if pairs.len() <= most {
                 return is_changed;
+            }
+            let members: Vec<u32> = region.members(k).map(|member| member.particle).collect();
+            if !has_a_corner(&region, &pairs, &members) {
+                continue;
             }
             let before = self.local.particles.clone();
             self.give_back(k, skin);
-            let now = self.own_pairs(&self.places());
-            if now < left {
-                (left, is_changed) = (now, true);
+            let now = contact.all_own_pairs_again(&*region, &self.places(), (pairs.clone(), &members), &self.slabs);
+            if now.len() < pairs.len() {
+                (pairs, is_changed) = (now, true);
             } else {
                 self.local.particles = before;
             }
         }
-        if left > most {
+        if pairs.len() > most {
             (0..self.active.len()).for_each(|k| self.give_back(k, skin));
         }
-        is_changed || left > most
+        is_changed || pairs.len() > most
     }
 
     pub(super) fn places(&self) -> Vec<Vec3> {
@@ -92,9 +100,16 @@ impl Frame<'_> {
     /// Puts a joint's skin where skinning has it.
     fn give_back(&mut self, k: usize, skin: &[Vec3]) {
         let Local { region, particles, .. } = &mut self.local;
-        for member in region.free[k].iter().chain(&region.beyond[k]) {
+        for member in region.members(k) {
             let particle = &mut particles[member.particle as usize];
             [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
         }
     }
+}
+
+/// Whether one of these particles is a corner of a pair: no other can part it.
+fn has_a_corner(region: &Region, pairs: &[[u32; 2]], particles: &[u32]) -> bool {
+    let particles: HashSet<u32> = particles.iter().copied().collect();
+    let corners = pairs.as_flattened().iter().flat_map(|&t| region.triangles[t as usize]);
+    corners.into_iter().any(|corner| particles.contains(&corner))
 }

@@ -42,6 +42,7 @@ mod whole;
 
 use glam::{DAffine3, Vec3};
 
+use self::contact::Effort;
 use self::pairs::Slabs;
 use self::pairs::Suspects;
 pub use self::pairs::intersecting_pairs;
@@ -207,8 +208,9 @@ impl Refiner {
         let triangles: Vec<u32> = (0..surface.triangles.len() as u32).collect();
         let suspects = Suspects::all_of(&triangles);
         let farthest = solver::FARTHEST * self.prepared.cell as f32;
+        let effort = Effort { farthest, rounds: Quality::Bake.rounds() };
         let before = places.clone();
-        if self.prepared.contact.part(surface, &mut places, suspects, farthest, slabs).0.is_empty() {
+        if self.prepared.contact.part(surface, &mut places, suspects, effort, slabs).0.is_empty() {
             return;
         }
         // Layers of cloth can be smoothed away; they had better pass through each other.

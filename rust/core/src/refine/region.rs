@@ -188,6 +188,11 @@ impl Region {
         }
     }
 
+    /// The particles of joint `k`, free ones and those beyond.
+    pub(super) fn members(&self, k: usize) -> impl Iterator<Item = &Member> {
+        self.free[k].iter().chain(&self.beyond[k])
+    }
+
     /// Surface neighbours of a local surface vertex.
     pub(super) fn ring(&self, particle: u32) -> &[u32] {
         let i = particle as usize - self.nodes;

@@ -89,6 +89,14 @@ impl Quality {
         }
     }
 
+    /// Rounds of pushing that may follow on each other where skin has come through skin. A fist takes sixty, most of them in vain.
+    pub(super) fn rounds(self) -> usize {
+        match self {
+            Self::Live => 12,
+            Self::Bake => usize::MAX,
+        }
+    }
+
     /// Times that the volume is restored and the folds that this makes are taken out.
     pub(super) fn balloons(self) -> usize {
         match self {

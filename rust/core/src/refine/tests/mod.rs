@@ -180,7 +180,7 @@ fn pairs_looked_for_again_are_those_of_a_fresh_search() {
         moved.iter().for_each(|&i| places[i as usize] += corner(i + 99 * round) * 0.2);
         let fresh = contact.own_pairs(&skin, &places, Suspects::all_of(&all), &slabs);
         assert!(fresh.len() > 30 && fresh != pairs);
-        pairs = contact.own_pairs_again(&skin, &places, &all, (pairs, &moved), &slabs);
+        pairs = contact.all_own_pairs_again(&skin, &places, (pairs, &moved), &slabs);
         assert_eq!(pairs, fresh);
     }
 }
