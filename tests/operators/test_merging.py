@@ -165,3 +165,13 @@ def test_entries_are_added_as_scipy_adds_them(csr, n_columns):
     expected = sparse.coo_array((value, (vertex, bone)), shape=(41, n_columns)).toarray()
     assert np.array_equal(dense_of(csr, rows, n_columns), expected)
     assert (rows.values != 0).all()
+
+
+def test_a_factor_of_zero_adds_nothing_where_nobody_has_old_weights(merging, csr):
+    new, old = np.zeros((2, B), np.float32), np.zeros((2, B), np.float32)
+    new[:, 4], old[:, 0] = 1, 0.9
+    held, chosen = np.arange(B) != 4, np.full(B, True)
+    options = {"held": held, "chosen": chosen, "max_influences": 0}
+    for factor, expected in [(0.0, 0.0), (0.5, 0.1), (1.0, 0.1), (np.array([0.0, 0.5]), [0.0, 0.1])]:
+        rows = merging.merge(rows_of(csr, new), rows_of(csr, old), factor=factor, **options)
+        assert dense_of(csr, rows)[:, 4] == pytest.approx(np.broadcast_to(expected, 2), abs=1e-6)

@@ -93,7 +93,7 @@ fn a_stroke_reaches_eight_lengths_in_either_direction() {
     let mut prepared = prepared(body(3.0), &ribbon);
     // What is inpainted already is not trusted at all, and a change goes a long way through it.
     let gap = (560..590, MaskValue::Inpaint);
-    near(&mut prepared, &strokes(count, &[gap.clone()]));
+    near(&mut prepared, &strokes(count, std::slice::from_ref(&gap)));
     let forced = strokes(count, &[gap, (500..501, MaskValue::ForceMatch)]);
     let soft = || std::iter::repeat(rate(0.05));
     let before = rows_reached(soft());
