@@ -77,7 +77,7 @@ impl SurfaceIndex {
     }
 
     /// The same, and how many other triangles are as near, but for rounding errors, or no more than `tolerance` (world units)
-    /// farther away; those that share the closest point are among them, and some that are little farther away may be.
+    /// farther away; those that share the closest point are among them, and some that are a few times as far away may be.
     pub fn closest_points_and_ties(&self, queries: &[[f32; 3]], tolerance: f64) -> (Vec<SurfacePoint>, Vec<u32>) {
         self.found(queries, tolerance, |found| (found.point, found.ties)).into_par_iter().unzip()
     }
