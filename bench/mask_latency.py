@@ -6,7 +6,6 @@ Writes bench/mask_latency.md: both methods, 60 bones, median and worst of seven 
 """
 
 import os
-import platform
 import statistics
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "gui"))
 
 from conftest import found
+from machine import described
 
 METHODS = ("PAPER", "CONFIDENCE")
 COLUMNS = {
@@ -27,7 +27,7 @@ HEAD = """# From the release of the brush to the weights, painting the match mas
 
 Made by `SKINWRIGHT_BLENDER_TREES=TREE1:TREE2 python bench/mask_latency.py`. A dress on a figure of 60 bones;
 a brush that inpaints, held still before it is let go. Milliseconds, median (worst) of 7 strokes, each after the one
-before has been solved as a whole. AMD EPYC, {cores} cores, {system}; load before the run {load}.
+before has been solved as a whole. {machine}
 
 "first solve" is the one that the session begins with. "written" counts from the release and contains "solve and write",
 which begins once the timer has noticed the stroke. A stroke with the method *confidence* on a large garment is answered
@@ -40,8 +40,7 @@ def main(sizes: list[str]) -> None:
     blenders = found()
     if not blenders:
         sys.exit("no Blender with a window: set SKINWRIGHT_BLENDER_TREES or SKINWRIGHT_BLENDER")
-    load = f"{os.getloadavg()[0]:.1f}"
-    text = HEAD.format(cores=os.cpu_count(), system=platform.platform(), load=load)
+    text = HEAD.format(machine=described(os.getloadavg()[0]))
     for blender in blenders:
         record = blender.run("latency", ",".join(METHODS), *sizes, timeout=600, size=(800, 600))
         text += table(record)

@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib
 import meshes
 import numpy as np
+from machine import processor
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -70,7 +71,7 @@ def _report(figures: Figures, vertices: dict[str, int], plans: dict, load: float
         "unmatched. Medians; ours and the peers alternate, each in a process of its own. Where answers were compared",
         "they are equal: masks identical, largest difference of a weight below. The peers are described in peers.py.",
         "",
-        f"{_processor()}, {os.cpu_count()} cores, {platform.platform()}, Python {platform.python_version()};",
+        f"{processor()}, {os.cpu_count()} cores, {platform.platform()}, Python {platform.python_version()};",
         f"load before the run {load:.1f}; above 1 it makes walls of two threads too long, ours more than the peers'.",
         "",
         "![Time against size](results.png)",
@@ -122,11 +123,6 @@ def _ratios(figures: Figures, vertices: dict[str, int], measure: str) -> list[st
 
 def _row(*cells: str) -> str:
     return "| " + " | ".join(cells) + " |"
-
-
-def _processor() -> str:
-    lines = Path("/proc/cpuinfo").read_text().splitlines()
-    return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
 def _plot(figures: Figures, vertices: dict[str, int], path: Path) -> None:

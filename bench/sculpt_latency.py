@@ -7,7 +7,6 @@ artist. What the parts are stands in the file.
 """
 
 import os
-import platform
 import statistics
 import sys
 from pathlib import Path
@@ -15,6 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "gui"))
 
 from conftest import Blender, found
+from machine import described
 
 PARTS = ("noticed", "look", "solve", "write", "put back", "ours", "evaluate", "updated", "made ready", "drawn")
 HEAD = """# From mouse-up to the updated view, sculpting weights
@@ -49,15 +49,9 @@ def main(sizes: list[str]) -> None:
         sys.exit("no Blender with a window: set SKINWRIGHT_BLENDER_TREES or SKINWRIGHT_BLENDER")
     load = os.getloadavg()[0]
     tables, strokes = zip(*[table(blender, sizes) for blender in blenders], strict=True)
-    text = HEAD.format(strokes=strokes[0], machine=machine(load)) + "".join(tables)
+    text = HEAD.format(strokes=strokes[0], machine=described(load)) + "".join(tables)
     Path(__file__).with_suffix(".md").write_text(text)
     print(text)
-
-
-def machine(load: float) -> str:
-    lines = Path("/proc/cpuinfo").read_text().splitlines()
-    name = next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
-    return f"{name}, {os.cpu_count()} cores,\n{platform.platform()}; load before the run {load:.1f}."
 
 
 def table(blender: Blender, sizes: list[str]) -> tuple[str, int]:
