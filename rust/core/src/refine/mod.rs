@@ -33,6 +33,7 @@ mod report;
 mod settings;
 mod size;
 mod skeleton;
+mod skin;
 mod solver;
 mod surface;
 #[cfg(test)]

@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
-use super::contact::Skin;
 use super::frame::ActiveJoint;
 use super::holes::Rim;
 use super::joints::Member;
@@ -181,7 +180,7 @@ impl Region {
             rings,
             ring_lengths,
             triangles: chosen.triangles.iter().map(named).collect(),
-            triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island(t)).collect(),
+            triangle_islands: chosen.triangles.iter().map(|&t| prepared.surface.island_of(t)).collect(),
             triangle_names: chosen.triangles,
             rims: prepared.surface.rims.iter().filter_map(local_rim).collect(),
             global,

@@ -2,10 +2,10 @@
 
 use glam::{DAffine3, Vec3};
 
-use super::contact::{corners, grown};
 use super::coupling::shift;
 use super::pairs::Suspects;
 use super::predictor::{linear, skinned};
+use super::skin::{corners, grown};
 use super::solver::Frame;
 
 /// Rings around a fold that go all the way, in the order they are tried.

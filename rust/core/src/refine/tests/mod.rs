@@ -6,11 +6,12 @@ mod sweeps;
 use glam::Vec3;
 
 use super::constraint::{Axis, HalfSpace, bind, energy, project_stretch, self_collision, stretch, volume};
-use super::contact::{Contact, Skin};
+use super::contact::Contact;
 use super::pairs::{Slabs, Suspects, intersecting_pairs_of};
 use super::projection::{
     Batch, Blocks, Colouring, Flesh, Kernel, Kind, Limits, Multipliers, OfNodes, Particle, Stretch, project,
 };
+use super::skin::Skin;
 
 const CORNERS: [[f64; 3]; 4] = [[0.1, 0.2, -0.1], [1.3, 0.0, 0.2], [0.2, 0.9, 0.1], [-0.1, 0.3, 1.4]];
 
