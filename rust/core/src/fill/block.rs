@@ -7,7 +7,6 @@ use skinwright_solve::{Cholesky, Failure, Precision, RightHandSides, Solution, S
 
 use super::constraint::Known;
 use super::rows::{KnownRows, Row};
-use super::screened::{CORRECTION, SOLVES};
 use super::system::{self, Boundary};
 use crate::error::{Error, Result};
 use crate::laplacian::Laplacian;
@@ -17,6 +16,11 @@ use crate::progress::Progress;
 const REFUSE_ABOVE: f64 = 1e-8;
 /// The same of a factor in single precision, which serves screened solves: from here on the solver looks for another factor.
 const REFUSE_SINGLE_ABOVE: f64 = 1e-5;
+
+/// How many solves lead to the rows of a screened block, see [`screened`](super::screened).
+pub(super) const SOLVES: usize = 4;
+/// The place of the correction among them, which is zero at fixed rows.
+pub(super) const CORRECTION: usize = 2;
 
 /// Which energy a block minimises, and how its factor is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]

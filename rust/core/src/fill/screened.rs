@@ -20,7 +20,7 @@
 
 use skinwright_solve::{MOST_COLUMNS, SparseRows, SparseSolver, Term, Workspace};
 
-use super::block::{Block, BlockRows, Places, Solves, SparseColumns};
+use super::block::{Block, BlockRows, CORRECTION, Places, SOLVES, Solves, SparseColumns};
 use super::doubt::{DOUBTFUL, solved_with_care};
 use super::rows::Ragged;
 use crate::adjacency::NONE;
@@ -45,10 +45,6 @@ pub type RowTable = Ragged<(u32, f64)>;
 /// is solved on, empty where nothing was solved for.
 #[derive(Debug)]
 pub struct Found(pub(super) [Ragged<(u32, f32)>; SOLVES]);
-
-pub(super) const SOLVES: usize = 4;
-/// The place of U among them, which is zero at fixed rows.
-pub(super) const CORRECTION: usize = 2;
 
 /// Makes the problem a part of a larger one: some fixed vertices, the `held` ones (V), are not fixed there, and have the values
 /// that each solve of the larger problem has `found`.

@@ -12,11 +12,11 @@ use crate::kernels::Real;
 use crate::ordering::dissection::dissect;
 use crate::ordering::graph::Graph;
 use crate::substitute::backward::backward;
+use crate::substitute::columns::Columns;
 use crate::substitute::forward::{Stacks, activity, forward};
 use crate::substitute::rows::{SparseRows, Sum};
 use crate::substitute::solution::{Part, RightHandSides, Solution};
 use crate::substitute::sparse::{self, Workspace};
-use crate::substitute::substitution::Columns;
 use crate::{Failure, SymmetricMatrix};
 
 /// Right-hand sides solved together.
