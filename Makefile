@@ -45,7 +45,7 @@ BPY_.venv-5.3 := $(BPY_5.3)
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name '*.toml' -o -name '*.pyi')
 IN_TIME := timeout --kill-after=10
 # Cargo takes the processors that are there, whatever --jobs says.
-ON_ALL_CORES := env -u MAKEFLAGS
+ON_ALL_CORES := env -u MAKEFLAGS -u MFLAGS
 PYTEST = $(IN_TIME) 1800 $(1)/bin/python -m pytest --hypothesis-seed=1
 # bpy 4.2 crashes at random after some hundred operators in one process, so there each file of such tests has its own.
 # The native module alone is tested with the same Python beside 4.5.
