@@ -47,7 +47,7 @@ def merge(
 def _joined(new: Rows, old: Rows, factor: Factor, remainder: NDArray[np.float64]) -> Rows:
     """`factor` of the new and the rest of the old weights; the old alone where there are no new ones."""
     new_share = np.where(csr.row_sums(new) > 0, factor, 0.0)
-    has_only_new = not old.values.size and np.all(np.asarray(factor) > 0)
+    has_only_new = not old.values.size and np.all(factor > 0)
     if has_only_new or (new_share == 1).all():
         return new
     return _scaled(_mixed(new, old, new_share, 1.0 - new_share), remainder)

@@ -122,15 +122,13 @@ impl Contact {
                 break;
             }
             let (pushed, left) = self.push_apart(skin, places, pairs, effort, slabs);
-            let has_moved: HashSet<u32> = pushed.iter().copied().collect();
-            moved.extend(pushed);
+            moved.extend(&pushed);
             pairs = left;
             if !pairs.is_empty() {
                 break;
             }
             // Pushing looks around the pairs alone, and may have pressed them into what lies on the other side.
-            let still = |t: u32| !skin.triangles()[t as usize].iter().any(|i| has_moved.contains(i));
-            pairs = self.own_pairs(skin, places, Suspects { cleared: &still, ..suspects }, slabs);
+            pairs = self.own_pairs_again(skin, places, &triangles, (pairs, &pushed), slabs);
         }
         moved.sort_unstable();
         moved.dedup();
@@ -152,6 +150,7 @@ impl Contact {
         let among = by_island(skin, (0..skin.triangles().len() as u32).filter(is_near).collect());
         let most_rings = (WIDEST * farthest / mean_edge(skin, places, &pairs)).round().max(1.0) as usize;
         let (start, mut moved) = (places.clone(), Vec::new());
+        // More than the suspects' own.
         let mut known = self.own_pairs(skin, places, Suspects::all_of(&among), slabs);
         for (rings, step) in TRIES.into_iter().filter(|&(rings, _)| rings <= most_rings) {
             let (mut now, mut left, mut all, mut stalled) = (places.clone(), pairs.clone(), known.clone(), 0);

@@ -1,14 +1,12 @@
 //! Joints where solving has done worse than skinning.
 
-use std::collections::HashSet;
-
 use glam::{DAffine3, Vec3};
 
 use super::constraint::Axis;
 use super::coupling::place;
 use super::local::Local;
 use super::predictor::{linear, skinned};
-use super::region::Region;
+use super::skin::corners;
 use super::solver::Frame;
 
 /// Loss of a joint's volume from which it is asked whether skinning did better.
@@ -70,7 +68,9 @@ impl Frame<'_> {
                 return is_changed;
             }
             let members: Vec<u32> = region.members(k).map(|member| member.particle).collect();
-            if !has_a_corner(&region, &pairs, &members) {
+            // Only what has a corner in a pair can part it.
+            let corners = corners(&*region, &pairs);
+            if members.iter().all(|member| corners.binary_search(member).is_err()) {
                 continue;
             }
             let before = self.local.particles.clone();
@@ -105,11 +105,4 @@ impl Frame<'_> {
             [particle[0], particle[1], particle[2]] = skin[member.particle as usize].to_array();
         }
     }
-}
-
-/// Whether one of these particles is a corner of a pair: no other can part it.
-fn has_a_corner(region: &Region, pairs: &[[u32; 2]], particles: &[u32]) -> bool {
-    let particles: HashSet<u32> = particles.iter().copied().collect();
-    let corners = pairs.as_flattened().iter().flat_map(|&t| region.triangles[t as usize]);
-    corners.into_iter().any(|corner| particles.contains(&corner))
 }

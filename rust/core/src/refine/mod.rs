@@ -44,9 +44,8 @@ mod whole;
 use glam::{DAffine3, Vec3};
 
 use self::contact::Effort;
-use self::pairs::Slabs;
-use self::pairs::Suspects;
 pub use self::pairs::intersecting_pairs;
+use self::pairs::{Slabs, Suspects};
 use self::prepared::Prepared;
 pub use self::projection::Kernel;
 pub use self::report::{JointMeasure, JointReport, Report};

@@ -57,14 +57,15 @@ impl Skin for Region {
     }
 }
 
-pub(super) fn all_triangles(skin: &dyn Skin) -> Vec<u32> {
-    by_island(skin, (0..skin.triangles().len() as u32).collect())
-}
-
 /// These triangles, those of an island one after the other.
 pub(super) fn by_island(skin: &dyn Skin, mut triangles: Vec<u32>) -> Vec<u32> {
     triangles.sort_by_key(|&t| skin.island(t));
     triangles
+}
+
+/// All triangles, likewise.
+pub(super) fn all_triangles(skin: &dyn Skin) -> Vec<u32> {
+    by_island(skin, (0..skin.triangles().len() as u32).collect())
 }
 
 /// The vertices of these pairs, ascending.

@@ -43,11 +43,6 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// The connected component of a triangle.
-    pub(super) fn island_of(&self, triangle: u32) -> u32 {
-        self.island[self.triangles[triangle as usize][0] as usize]
-    }
-
     pub(super) fn new(mesh: &TriMesh<'_>) -> Self {
         let (of_vertex, source) = weld(mesh);
         let rest: Vec<DVec3> = source.iter().map(|&i| Vec3::from(mesh.positions()[i as usize]).as_dvec3()).collect();
@@ -82,6 +77,11 @@ impl Surface {
             neighbours,
             edges,
         }
+    }
+
+    /// The connected component of a triangle.
+    pub(super) fn island_of(&self, triangle: u32) -> u32 {
+        self.island[self.triangles[triangle as usize][0] as usize]
     }
 
     pub(super) fn len(&self) -> usize {

@@ -3,7 +3,6 @@
 use glam::{DAffine3, Vec3};
 
 use super::coupling::shift;
-use super::pairs::Suspects;
 use super::predictor::{linear, skinned};
 use super::skin::{corners, grown};
 use super::solver::Frame;
@@ -84,14 +83,8 @@ impl Frame<'_> {
     /// How many pairs there are after `moves`; all there were before have moved.
     fn pairs_after(&self, places: &[Vec3], moves: &[(u32, Vec3)]) -> usize {
         let region = &*self.local.region;
-        let (mut places, mut has_moved) = (places.to_vec(), vec![false; places.len()]);
-        for &(p, by) in moves {
-            places[p as usize] += by;
-            has_moved[p as usize] = true;
-        }
-        let all: Vec<u32> = (0..region.triangles.len() as u32).collect();
-        let still = |t: u32| !region.triangles[t as usize].iter().any(|&p| has_moved[p as usize]);
-        let among = Suspects { cleared: &still, ..Suspects::all_of(&all) };
-        self.prepared.contact.own_pairs(region, &places, among, &self.slabs).len()
+        let (mut places, moved): (_, Vec<u32>) = (places.to_vec(), moves.iter().map(|&(p, _)| p).collect());
+        moves.iter().for_each(|&(p, by)| places[p as usize] += by);
+        self.prepared.contact.all_own_pairs_again(region, &places, (Vec::new(), &moved), &self.slabs).len()
     }
 }

@@ -76,8 +76,8 @@ impl SurfaceIndex {
         self.found(queries, 0.0, |found| found.point)
     }
 
-    /// The same, and how many other triangles are as near, but for rounding errors, or no more than `tolerance` (world units)
-    /// farther away; those that share the closest point are among them, and some that are a few times as far away may be.
+    /// The same, and how many other triangles are as near: no more than `tolerance` (world units) farther away, or rounding
+    /// errors if it is 0. Those that share the closest point are among them; some that are little farther away may be.
     pub fn closest_points_and_ties(&self, queries: &[[f32; 3]], tolerance: f64) -> (Vec<SurfacePoint>, Vec<u32>) {
         self.found(queries, tolerance, |found| (found.point, found.ties)).into_par_iter().unzip()
     }

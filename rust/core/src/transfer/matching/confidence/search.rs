@@ -26,9 +26,9 @@ pub(super) fn choices(
 ) -> Vec<Choice> {
     let around = VertexTriangles::new(target.triangles, target.positions.len());
     let sides = target.triangles.par_iter().with_min_len(1024).map(|t| side(&target, t)).collect();
-    let corners = triangles_around(source);
+    let around_source = triangles_around(source);
     let size = source.size();
-    let search = Search { source, target, closest, ties, corners, around, sides, size };
+    let search = Search { source, target, closest, ties, around_source, around, sides, size };
     let all: Vec<u32> = (0..closest.len() as u32).collect();
     let mut choices = search.choices(&all, false);
     let lining = search.lining(&choices);
@@ -45,7 +45,7 @@ struct Search<'a> {
     closest: &'a [SurfacePoint],
     ties: &'a [u32],
     /// The source's triangles around each of its vertices.
-    corners: VertexTriangles,
+    around_source: VertexTriangles,
     /// The triangles around each vertex of the target, and their normals.
     around: VertexTriangles,
     sides: Vec<Option<Vec3>>,
@@ -72,7 +72,7 @@ impl Search<'_> {
     /// The closest point if there is no other to choose; where to search if there may be.
     fn only_choice(&self, i: usize, both_ways: bool) -> Result<Choice, Bound> {
         let bound = self.bound(i, both_ways);
-        if bound.cost > 0.0 || self.ties[i] != sharing(self.source, &self.corners, &self.closest[i]) {
+        if bound.cost > 0.0 || self.ties[i] != sharing(self.source, &self.around_source, &self.closest[i]) {
             return Err(bound);
         }
         let closest = &self.closest[i];
